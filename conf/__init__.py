@@ -1,0 +1,1 @@
+"""Hydra configuration files (shipped as ``geomotion.conf``; holds no code)."""

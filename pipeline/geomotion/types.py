@@ -1,0 +1,24 @@
+"""Shape names used in every signature of the library (checked by beartype in the tests)."""
+
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+__all__ = [
+    "Bool",
+    "Float",
+    "Int",
+    "Matrix",
+    "State",
+    "States",
+    "Tensor",
+    "Times",
+    "Trajectories",
+    "Velocity",
+]
+
+State = Float[Tensor, "*batch D"]  # robot coordinates [m] unless a docstring says otherwise
+Velocity = Float[Tensor, "*batch D"]  # [m/s]
+Matrix = Float[Tensor, "*batch D D"]
+States = Float[Tensor, "point D"]
+Times = Float[Tensor, " time"]  # [s], increasing
+Trajectories = Float[Tensor, "*batch time D"]
