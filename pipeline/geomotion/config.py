@@ -216,7 +216,12 @@ class LineIntegralField(FieldConfig):
 
     def __post_init__(self) -> None:
         _require_positive("field", self, "nodes", "relative_tolerance", "absolute_tolerance")
-        _require(len(self.hidden_units) > 0 and min(self.hidden_units) > 0, "field.hidden_units", self.hidden_units, "positive layer widths")
+        _require(
+            len(self.hidden_units) > 0 and min(self.hidden_units) > 0,
+            "field.hidden_units",
+            self.hidden_units,
+            "positive layer widths",
+        )
 
 
 @dataclass
@@ -264,7 +269,9 @@ class TrainingConfig:
     log_every_steps: int = 20
 
     def __post_init__(self) -> None:
-        _require_positive("training", self, "steps", "learning_rate", "gradient_clip", "checkpoint_every_steps", "log_every_steps")
+        _require_positive(
+            "training", self, "steps", "learning_rate", "gradient_clip", "checkpoint_every_steps", "log_every_steps"
+        )
 
 
 @dataclass

@@ -68,7 +68,9 @@ class MissingArtefact(GeomotionError):
     """A run exists but lacks what a later stage needs."""
 
     def __init__(self, stage: str, name: str, run_id: str) -> None:
-        super().__init__(f"run {run_id} has no {name!r} of stage {stage!r}. Repeat that stage: ncds {stage} reuse=false.")
+        super().__init__(
+            f"run {run_id} has no {name!r} of stage {stage!r}. Repeat that stage: ncds {stage} reuse=false."
+        )
         self.stage, self.name, self.run_id = stage, name, run_id
 
 
@@ -84,7 +86,9 @@ class StoreUnavailable(GeomotionError):
     """The MLflow store cannot be opened or written."""
 
     def __init__(self, uri: str, reason: str) -> None:
-        super().__init__(f"MLflow store {uri} cannot be used: {reason}. Set tracking.root= to another folder or tracking.uri= to another store.")
+        super().__init__(
+            f"MLflow store {uri} cannot be used: {reason}. Set tracking.root= to another folder or tracking.uri= to another store."
+        )
         self.uri, self.reason = uri, reason
 
 
@@ -92,7 +96,9 @@ class DiskFull(GeomotionError):
     """Writing failed for lack of space; nothing half-written is kept."""
 
     def __init__(self, path: str | Path) -> None:
-        super().__init__(f"no space left while writing {path}. Free some space, or write elsewhere with tracking.root=; then repeat the command: finished stages are reused.")
+        super().__init__(
+            f"no space left while writing {path}. Free some space, or write elsewhere with tracking.root=; then repeat the command: finished stages are reused."
+        )
         self.path = str(path)
 
 
@@ -100,7 +106,9 @@ class TrainingDiverged(GeomotionError):
     """A loss or parameter became NaN or infinite."""
 
     def __init__(self, step: int, loss: float) -> None:
-        super().__init__(f"training diverged at step {step}: the loss is {loss}. Lower training.learning_rate or try another seed.")
+        super().__init__(
+            f"training diverged at step {step}: the loss is {loss}. Lower training.learning_rate or try another seed."
+        )
         self.step, self.loss = step, loss
 
 

@@ -126,7 +126,9 @@ def validate(name: str, trajectories: Sequence[Trajectory]) -> None:
                 raise DatasetError(name, f"{place}: {channel} has {len(values)} rows, time has {len(trajectory)}")
             bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
             if bad.size:
-                raise DatasetError(name, f"{place}, row {bad[0]}: {channel} is {values[bad[0]].tolist()}; expected finite numbers")
+                raise DatasetError(
+                    name, f"{place}, row {bad[0]}: {channel} is {values[bad[0]].tolist()}; expected finite numbers"
+                )
 
 
 def _validate_time(name: str, place: str, time_s: Array) -> None:
@@ -137,4 +139,6 @@ def _validate_time(name: str, place: str, time_s: Array) -> None:
     if (steps <= 0).any():
         row = int(np.flatnonzero(steps <= 0)[0]) + 1
         what = "repeats" if steps[row - 1] == 0 else "goes back from"
-        raise DatasetError(name, f"{place}, row {row}: time {time_s[row]:g} s {what} {time_s[row - 1]:g} s; expected increasing times")
+        raise DatasetError(
+            name, f"{place}, row {row}: time {time_s[row]:g} s {what} {time_s[row - 1]:g} s; expected increasing times"
+        )
