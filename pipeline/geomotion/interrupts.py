@@ -1,0 +1,60 @@
+"""Ctrl-C and termination signals as an exception that stages can postpone to a safe point."""
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+from geomotion.errors import Interrupted
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+HINT = "Repeat the command to continue where it stopped."
+
+
+class PendingInterrupt:
+    """Set when a signal arrived inside :func:`postponed_interrupts`."""
+
+    def __init__(self) -> None:
+        self.signal_number: int | None = None
+
+    def raise_if_set(self) -> None:
+        """Turn a postponed signal into the exception."""
+        if self.signal_number is not None:
+            raise Interrupted(self.signal_number, HINT)
+
+
+@contextmanager
+def interrupts_as_errors() -> Iterator[None]:
+    """Raise :class:`Interrupted` where the program stands when a signal arrives (main thread only)."""
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        raise Interrupted(number, HINT)
+
+    with _handlers(handle):
+        yield
+
+
+@contextmanager
+def postponed_interrupts() -> Iterator[PendingInterrupt]:
+    """Note the first signal and let the loop decide when to stop; a second one stops at once."""
+    pending = PendingInterrupt()
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if pending.signal_number is not None:
+            raise Interrupted(number, HINT)
+        pending.signal_number = number
+
+    with _handlers(handle):
+        yield pending
+
+
+@contextmanager
+def _handlers(handle: "signal._HANDLER") -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    try:
+        for number in SIGNALS:
+            signal.signal(number, handle)
+        yield
+    finally:
+        for number, previous in before.items():
+            signal.signal(number, previous)

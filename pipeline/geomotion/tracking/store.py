@@ -1,0 +1,113 @@
+"""Opening the MLflow store: SQLite in write-ahead mode below ``runs/``, or any other MLflow URI."""
+
+import logging
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from filelock import FileLock, Timeout
+
+from geomotion.config import TrackingConfig
+from geomotion.errors import DiskFull, StoreUnavailable, is_disk_full
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+
+LOCK_TIMEOUT_S = 120.0
+BUSY_TIMEOUT_S = 60.0
+
+
+def store_uri(config: TrackingConfig) -> str:
+    """The MLflow URI of a configuration."""
+    return config.uri or f"sqlite:///{database(config)}"
+
+
+def database(config: TrackingConfig) -> Path:
+    """Where the local store's database is or would be."""
+    return Path(config.root).resolve() / "mlflow.db"
+
+
+def exists(config: TrackingConfig) -> bool:
+    """Whether there is a store to look runs up in."""
+    return config.uri is not None or database(config).is_file()
+
+
+@contextmanager
+def store_errors(uri: str) -> Iterator[None]:
+    """Turn what MLflow, SQLAlchemy and the file system raise about the store into one clear error."""
+    from mlflow.exceptions import MlflowException
+    from sqlalchemy.exc import SQLAlchemyError
+
+    try:
+        yield
+    except (MlflowException, SQLAlchemyError, sqlite3.Error) as error:
+        raise StoreUnavailable(uri, _reason(error)) from error
+    except OSError as error:
+        if is_disk_full(error):
+            raise DiskFull(error.filename or uri) from error
+        raise StoreUnavailable(uri, error.strerror or str(error)) from error
+
+
+def _reason(error: Exception) -> str:
+    text = str(error)
+    for sign, reason in (
+        ("database is locked", "the database is locked by another program"),
+        ("not a database", "the file is not an SQLite database"),
+        ("malformed", "the database is damaged"),
+        ("readonly", "the database is read-only"),
+        ("unable to open", "the database cannot be opened"),
+        ("disk is full", "the disk is full"),
+        ("out-of-date database schema", "it was made by another MLflow version; run `mlflow db upgrade` on it"),
+    ):
+        if sign in text:
+            return reason
+    return text.strip().splitlines()[0] if text.strip() else type(error).__name__
+
+
+def open_store(config: TrackingConfig) -> tuple["MlflowClient", str]:
+    """The client and the experiment's id; creates what is missing.
+
+    The first user of a fresh store creates it under a file lock: MLflow's own migrations race.
+
+    Raises:
+        StoreUnavailable: If the store cannot be opened, is locked for two minutes, or is no MLflow store.
+        DiskFull: If there is no space for it.
+    """
+    _quiet()
+    uri = store_uri(config)
+    root = Path(config.root).resolve()
+    import mlflow
+
+    with store_errors(uri):
+        root.mkdir(parents=True, exist_ok=True)
+        try:
+            with FileLock(root / ".store.lock", timeout=LOCK_TIMEOUT_S):
+                if config.uri is None:
+                    _prepare(database(config))
+                mlflow.set_tracking_uri(uri)
+                client = mlflow.MlflowClient()
+                found = client.get_experiment_by_name(config.experiment)
+                if found is not None:
+                    return client, found.experiment_id
+                location = (root / "artifacts").as_uri() if config.uri is None else None
+                return client, client.create_experiment(config.experiment, artifact_location=location)
+        except Timeout as error:
+            raise StoreUnavailable(uri, f"another program has held {root / '.store.lock'} for two minutes") from error
+
+
+def _prepare(path: Path) -> None:
+    """Switch on write-ahead logging, which several writers need; it persists in the file."""
+    with closing(sqlite3.connect(path, timeout=BUSY_TIMEOUT_S)) as connection:
+        connection.execute("PRAGMA journal_mode=WAL")
+
+
+def _quiet() -> None:
+    os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")
+    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
+    os.environ.setdefault("MLFLOW_SQLALCHEMYSTORE_POOLCLASS", "NullPool")
+    for name in ("mlflow", "alembic", "mlflow.store.db.utils"):
+        logging.getLogger(name).setLevel(logging.WARNING)
