@@ -1,6 +1,7 @@
 """Shared fixtures. Shape annotations of the library are checked while the tests run."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -34,3 +35,22 @@ def lasa_folder() -> Path:
 def robotasks9_folder() -> Path:
     """Folder with the .npy files of RoboTasks9."""
     return _folder(SHARED / "data/robotasks9-franka", "RoboTasks9")
+
+
+@pytest.fixture(scope="session")
+def _empty_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An initialised MLflow store, which takes seconds to make; tests copy it."""
+    from geomotion.config import TrackingConfig
+    from geomotion.tracking import store
+
+    root = tmp_path_factory.mktemp("store")
+    store.open_store(TrackingConfig(root=str(root), experiment="template"))
+    return root
+
+
+@pytest.fixture
+def fresh_store(_empty_store: Path, tmp_path: Path) -> Path:
+    """Root of a store that holds nothing yet."""
+    root = tmp_path / "runs"
+    shutil.copytree(_empty_store, root)
+    return root

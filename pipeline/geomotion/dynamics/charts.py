@@ -70,3 +70,50 @@ class ComposedChart(nn.Module):
         middle, push_inner = self.inner.linearise(x)
         z, push_outer = self.outer.linearise(middle)
         return z, lambda velocity: push_inner(push_outer(velocity))
+
+
+class AnchoredChart(nn.Module):
+    """z = ψ(x) - ψ(x*): the same chart with the anchor x* at the origin.
+
+    While training, ψ(x*) follows the parameters; in evaluation mode it is computed once.
+
+    Args:
+        chart: ψ.
+        anchor: x*, shape (D,) [m].
+    """
+
+    anchor: Tensor
+
+    def __init__(self, chart: Chart, anchor: Float[Tensor, " D"]) -> None:
+        super().__init__()
+        self.chart = chart
+        self.dim = chart.dim
+        self.register_buffer("anchor", anchor)
+        self._image: Tensor | None = None
+
+    def train(self, mode: bool = True) -> "AnchoredChart":
+        self._image = None
+        return super().train(mode)
+
+    def _apply(self, *args: object, **options: object) -> "AnchoredChart":
+        self._image = None  # moved to another type or device
+        return super()._apply(*args, **options)  # type: ignore[arg-type]
+
+    @property
+    def image(self) -> Float[Tensor, " D"]:
+        """ψ(x*)."""
+        if self.training:
+            return self.chart.to_latent(self.anchor)
+        if self._image is None:
+            self._image = self.chart.to_latent(self.anchor).detach()
+        return self._image
+
+    def to_latent(self, x: State) -> State:
+        return self.chart.to_latent(x) - self.image
+
+    def to_ambient(self, z: State) -> State:
+        return self.chart.to_ambient(z + self.image)
+
+    def linearise(self, x: State) -> tuple[State, PushForward]:
+        z, push_forward = self.chart.linearise(x)
+        return z - self.image, push_forward

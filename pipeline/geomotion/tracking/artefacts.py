@@ -3,14 +3,13 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, is_dataclass
-from enum import Enum
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import geomotion
+from geomotion.config import plain
 from geomotion.errors import CorruptArtefact, MissingArtefact
 
 NOT_DIGESTED = ("figures", "config.json", "environment.json")
@@ -62,19 +61,6 @@ def digest_of(folder: Path) -> str:
         if name.parts[0] not in NOT_DIGESTED:
             digest.update(name.as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
-
-
-def plain(value: object) -> Any:
-    """Configuration objects as JSON types; each dataclass says which one it is."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return {"kind": type(value).__name__, **{name: plain(getattr(value, name)) for name in asdict(value)}}
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, Mapping):
-        return {str(name): plain(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return value
 
 
 def run_key(stage: str, config: object, inputs: Mapping[str, Artefacts]) -> str:

@@ -1,8 +1,10 @@
 """Runs of commands and stages: reuse of finished ones, resumption of stopped ones, look-up by name."""
 
 import json
+import logging
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,12 +14,14 @@ from urllib.parse import unquote, urlparse
 
 from filelock import FileLock
 
-from geomotion.config import TrackingConfig
+from geomotion.config import TrackingConfig, plain
 from geomotion.errors import GeomotionError, Interrupted, MissingRun
 from geomotion.files import write_json
 from geomotion.tracking import store
-from geomotion.tracking.artefacts import Artefacts, digest_of, environment, plain, run_key
+from geomotion.tracking.artefacts import Artefacts, digest_of, environment, run_key
 from geomotion.tracking.stage import Stage, StageRun
+
+logger = logging.getLogger("geomotion")
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -84,10 +88,24 @@ class Tracker:
         with FileLock(self.work / f"{key}.lock"):
             found = self._finished(key) if self.reuse and not stage.reads_outside else None
             if found is None:
+                begun = time.monotonic()
                 found = self._execute(stage, config, inputs, parent, key)
-        with store.store_errors(self.uri):
-            self.client.set_tag(parent.run_id, MEMBER + stage.name, found.run_id)
+                logger.info("%s: done in %.1f s", stage.name, time.monotonic() - begun)
+            else:
+                logger.info("%s: reused run %s", stage.name, found.run_id[:8])
+        self.link(parent, {stage.name: found})
         return found
+
+    def link(self, command: CommandRun, stages: Mapping[str, Artefacts]) -> None:
+        """Note that finished stages belong to a command."""
+        with store.store_errors(self.uri):
+            for name, found in stages.items():
+                self.client.set_tag(command.run_id, MEMBER + name, found.run_id)
+
+    def log_document(self, command: CommandRun, name: str, document: dict[str, Any]) -> None:
+        """Keep a JSON document with the run of a command."""
+        with store.store_errors(self.uri):
+            self.client.log_dict(command.run_id, document, name)
 
     def _execute(
         self, stage: Stage, config: object, inputs: Mapping[str, Artefacts], parent: CommandRun, key: str

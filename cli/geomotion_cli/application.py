@@ -1,0 +1,142 @@
+"""One verb as a Hydra application: compose, convert to the typed configuration, call the pipeline, publish.
+
+Errors are told where they happen, inside the job: Hydra would wrap them, and a sweep's workers could not
+send all of them back.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, Any
+
+import hydra
+from hydra._internal.utils import get_args_parser
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from geomotion.config import GmsConfig, NcdsConfig, Output
+from geomotion.errors import Interrupted
+from geomotion_cli.failures import Failure, Reporter, did_you_mean, pipeline_error, usage_error
+from geomotion_cli.hydra_errors import retell, unknown_key
+from geomotion_cli.streams import hydras_remark_removed, output_to_stderr
+
+if TYPE_CHECKING:
+    from geomotion.stages.commands import VerbResult
+
+RunVerb = Callable[[str, GmsConfig | NcdsConfig, list[str]], "VerbResult"]
+"""Carries out a verb with its typed configuration and the overrides that were typed."""
+
+
+class JobFailed(Exception):
+    """A job that has told about its failure; carries nothing but the exit status, so that workers can send it."""
+
+    def __init__(self, exit_code: int) -> None:
+        super().__init__(exit_code)
+        self.exit_code = exit_code
+
+
+class UnreadableArguments(Exception):
+    """Flags that the command line does not have."""
+
+
+def run(program: str, verb: str, arguments: list[str], reporter: Reporter, run_verb: RunVerb | None = None) -> int:
+    """Run one verb, or a sweep of it, and return the exit status."""
+
+    def job(config: DictConfig) -> float | None:
+        return _run_job(verb, config, reporter, run_verb)
+
+    try:
+        _check_flags(arguments)
+        return run_hydra(program, reporter.command, arguments, job)
+    except JobFailed as failed:
+        return failed.exit_code
+    except BrokenPipeError:
+        raise
+    except UnreadableArguments as error:
+        return reporter.report(usage_error(str(error)), error)
+    except (HydraException, OmegaConfBaseException, ValueError) as error:
+        return reporter.report(usage_error(retell(error)), error)
+    except OSError as error:
+        return reporter.report(Failure("OSError", f"{error.filename}: {error.strerror}.", 1), error)
+    except Exception as error:
+        return reporter.report(pipeline_error(error), error)
+
+
+def run_hydra(
+    program: str, command: str, arguments: list[str], job: Callable[[DictConfig], float | None] | None = None
+) -> int:
+    """Hand `arguments` to Hydra under the name `command`; its errors are raised, not printed."""
+    sys.argv = [command, *arguments]
+    os.environ["HYDRA_FULL_ERROR"] = "1"
+    application = hydra.main(version_base="1.3", config_path="pkg://geomotion.conf", config_name=program)
+    try:
+        with hydras_remark_removed():
+            application(job)()
+    except SystemExit as leaving:
+        return int(leaving.code or 0)
+    return 0
+
+
+def _check_flags(arguments: list[str]) -> None:
+    """Refuse unknown flags in one line, before Hydra does it in twenty."""
+    parser = get_args_parser()
+
+    def refuse(message: str) -> None:
+        raise UnreadableArguments(f"{message}; --help shows what there is.")
+
+    parser.error = refuse
+    known = [flag for action in parser._actions for flag in action.option_strings]
+    unknown = [argument for argument in parser.parse_known_args(arguments)[1] if argument.startswith("-")]
+    if unknown:
+        raise UnreadableArguments(f"unknown flag {unknown[0]!r}.{did_you_mean(unknown[0], [*known, '--debug'])}")
+
+
+def _run_job(verb: str, config: DictConfig, reporter: Reporter, run_verb: RunVerb | None) -> float | None:
+    try:
+        settings = _typed(config)
+        with output_to_stderr():
+            result = (run_verb or _pipeline())(verb, settings, list(HydraConfig.get().overrides.task))
+    except Interrupted as error:
+        raise SystemExit(reporter.report(pipeline_error(error), error)) from None  # ends a sweep, too
+    except OmegaConfBaseException as error:
+        raise JobFailed(reporter.report(usage_error(retell(error)), error)) from None
+    except Exception as error:
+        raise JobFailed(reporter.report(pipeline_error(error), error)) from None
+    _publish(result, settings.output)
+    if result.exit_code:
+        raise JobFailed(result.exit_code)
+    return result.objective
+
+
+def _pipeline() -> RunVerb:
+    from geomotion.stages.commands import run_verb
+
+    return run_verb
+
+
+def _publish(result: "VerbResult", output: Output) -> None:
+    text = json.dumps(result.document, allow_nan=False) if output is Output.json else result.text
+    print(text, flush=True)
+
+
+def _typed(config: DictConfig) -> GmsConfig | NcdsConfig:
+    settings = OmegaConf.to_object(config)
+    assert isinstance(settings, GmsConfig)
+    for key in _foreign_keys(settings):
+        raise UnknownSetting(unknown_key(key, config))
+    return settings
+
+
+def _foreign_keys(settings: Any, prefix: str = "") -> list[str]:
+    """Keys that were added with ``+key=value`` and that nothing reads."""
+    declared = {item.name for item in fields(settings)}
+    foreign = [prefix + name for name in vars(settings) if name not in declared]
+    for name in declared:
+        value = getattr(settings, name)
+        if is_dataclass(value):
+            foreign += _foreign_keys(value, f"{prefix}{name}.")
+    return foreign

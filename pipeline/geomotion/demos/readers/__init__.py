@@ -1,0 +1,28 @@
+"""Readers: from files to :class:`~geomotion.demos.demonstrations.Demonstrations`, one module per source."""
+
+from geomotion.config import DatasetConfig, FolderDataset, LasaDataset, LettersDataset, RoboTasks9Dataset
+from geomotion.demos.demonstrations import Demonstrations
+from geomotion.demos.generators import letters
+from geomotion.demos.readers import folder, lasa, robotasks9
+
+__all__ = ["read"]
+
+
+def read(config: DatasetConfig) -> Demonstrations:
+    """The recordings that a configuration names, as the source gives them: no preprocessing, SI units.
+
+    Raises:
+        MissingData: If they are not on this machine and cannot be fetched; says how to get them.
+        DatasetError: If they break a rule; names file, demonstration, row and rule.
+    """
+    match config:
+        case LasaDataset():
+            return lasa.read(config)
+        case RoboTasks9Dataset():
+            return robotasks9.read(config)
+        case FolderDataset():
+            return folder.read(config)
+        case LettersDataset():
+            return letters.generate(config)
+        case _:
+            raise TypeError(f"no reader for {type(config).__name__}")

@@ -1,0 +1,144 @@
+"""From a table of named columns to trajectories in SI units."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geomotion.config import FolderDataset
+from geomotion.demos.columns import (
+    ALL_COLUMNS,
+    BOOKKEEPING_COLUMNS,
+    DEMO_COLUMNS,
+    METRES_PER,
+    QUATERNION_AXES,
+    TIME_COLUMNS,
+    Column,
+    parse,
+    sorted_axes,
+)
+from geomotion.demos.demonstrations import VELOCITY_OF, Array, Trajectory
+from geomotion.demos.readers.tables import Table
+from geomotion.errors import DatasetError
+
+UNIT_NORM_TOLERANCE = 1e-2  # recordings printed with three digits still pass
+
+
+def trajectories_of(table: Table, path: Path, config: FolderDataset) -> list[Trajectory]:
+    """Translate columns to channels [m, rad] and split the rows into demonstrations.
+
+    Args:
+        table: Columns by name, one value per row.
+        path: Where they come from, for messages and labels.
+        config: Gives the unit of unnamed lengths and the rate of recordings without time stamps.
+
+    Raises:
+        DatasetError: If a column is unknown, doubled, missing or not numeric, or a quaternion is not of unit length.
+    """
+    known = {name: column for name in table if (column := parse(name))}
+    _refuse_unknown(path, set(table) - set(known) - {*TIME_COLUMNS, *DEMO_COLUMNS, *BOOKKEEPING_COLUMNS})
+    if not known:
+        raise DatasetError(path, f"holds no positions or joints; expected columns such as {', '.join(ALL_COLUMNS[5:8])}")
+    channels = {
+        channel: _channel(path, channel, table, known, METRES_PER[config.length_unit.value])
+        for channel in dict.fromkeys(column.channel for column in known.values())
+    }
+    _refuse_unpaired_velocities(path, known)
+    demo_column = _only(path, table, DEMO_COLUMNS)
+    time_column = _only(path, table, TIME_COLUMNS)
+    groups = _groups(table[demo_column]) if demo_column else [(path.stem, np.arange(len(next(iter(channels.values())))))]
+    return [
+        Trajectory(
+            time_s=_times(path, table, time_column, rows, config.sampling_rate_hz),
+            channels={name: values[rows] for name, values in channels.items()},
+            label=label,
+        )
+        for label, rows in groups
+    ]
+
+
+def _channel(path: Path, channel: str, table: Table, known: dict[str, Column], metres_per_unit: float) -> Array:
+    """Values of a channel in SI units, shape (row, axis)."""
+    names: dict[str, str] = {}
+    for name, column in known.items():
+        if column.channel == channel:
+            if column.axis in names:
+                raise DatasetError(path, f"{name} and {names[column.axis]} are the same axis; keep one of them")
+            names[column.axis] = name
+    columns = [names[axis] for axis in sorted_axes(names)]
+    values = np.stack([_numbers(path, name, table[name]) for name in columns], axis=1)
+    if channel == "orientation_wxyz":
+        return _unit_quaternions(path, names, values)
+    if channel in ("position_m", "velocity_m_per_s"):
+        units = [known[name].unit for name in columns]
+        return values * np.array([METRES_PER[unit] if unit else metres_per_unit for unit in units])
+    return values
+
+
+def _unit_quaternions(path: Path, axes: Iterable[str], values: Array) -> Array:
+    if set(axes) != set(QUATERNION_AXES):
+        raise DatasetError(path, f"orientation has axes {', '.join(sorted(axes))}; expected w, x, y, z")
+    norms = np.linalg.norm(values, axis=1)
+    bad = np.flatnonzero(np.abs(norms - 1) > UNIT_NORM_TOLERANCE)
+    if bad.size:
+        raise DatasetError(path, f"row {bad[0]}: quaternion of norm {norms[bad[0]]:g}; expected 1")
+    return np.asarray(values / norms[:, None], dtype=np.float64)
+
+
+def _numbers(path: Path, name: str, values: NDArray[Any]) -> Array:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (ValueError, TypeError) as error:
+        row = next(row for row, value in enumerate(values) if not _is_number(value))
+        raise DatasetError(path, f"row {row}: {name} is {values[row]!r}; expected a number") from error
+
+
+def _is_number(value: object) -> bool:
+    try:
+        float(value)  # type: ignore[arg-type]
+    except (ValueError, TypeError):
+        return False
+    return True
+
+
+def _times(path: Path, table: Table, column: str | None, rows: NDArray[np.intp], rate_hz: float | None) -> Array:
+    if column:
+        return _numbers(path, column, table[column])[rows]
+    if rate_hz is None:
+        expected = f"expected {TIME_COLUMNS[0]}, or the rate of the recording in dataset.sampling_rate_hz="
+        raise DatasetError(path, f"holds no time; {expected}")
+    return np.arange(len(rows)) / rate_hz
+
+
+def _groups(demos: NDArray[Any]) -> list[tuple[str, NDArray[np.intp]]]:
+    """Label and rows of every demonstration, in the order in which they first appear."""
+    labels, first, inverse = np.unique(demos.astype(str), return_index=True, return_inverse=True)
+    return [(str(labels[number]), np.flatnonzero(inverse == number)) for number in np.argsort(first)]
+
+
+def _only(path: Path, table: Table, names: Iterable[str]) -> str | None:
+    found = [name for name in names if name in table]
+    if len(found) > 1:
+        raise DatasetError(path, f"{' and '.join(found)} say the same; keep one of them")
+    return found[0] if found else None
+
+
+def _refuse_unknown(path: Path, names: set[str]) -> None:
+    if names:
+        name = min(names)
+        close = get_close_matches(name.lower(), ALL_COLUMNS, n=1, cutoff=0.4)
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        raise DatasetError(path, f"unknown column {name!r}; {hint}docs/data.md lists the names")
+
+
+def _refuse_unpaired_velocities(path: Path, known: dict[str, Column]) -> None:
+    axes: dict[str, list[str]] = {}
+    for column in known.values():
+        axes.setdefault(column.channel, []).append(column.axis)
+    for channel, velocity in VELOCITY_OF.items():
+        if velocity in axes and sorted_axes(axes[velocity]) != sorted_axes(axes.get(channel, [])):
+            expected = f"those of {channel} ({', '.join(axes.get(channel, [])) or 'absent'}), in the same order"
+            raise DatasetError(path, f"{velocity} has axes {', '.join(axes[velocity])}; expected {expected}")

@@ -1,0 +1,95 @@
+"""What is claimed about the contraction of a field, in which metric, at what rate, and why."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import Enum
+from typing import Any
+
+import torch
+
+from geomotion.dynamics.fields import ChartedField
+from geomotion.dynamics.linear import LinearField
+from geomotion.types import Float, States, Tensor
+
+
+class Claim(Enum):
+    """How much is known about contraction."""
+
+    by_construction = "by_construction"  # holds for every value of the parameters
+    verified_on_set = "verified_on_set"  # bounded on a stated set
+    measured_only = "measured_only"  # sampled; nothing is known between and beyond the samples
+
+
+@dataclass(frozen=True)
+class Overshoot:
+    """Condition number of Dψ on the demonstrated states: by how much robot-space distances may grow at first."""
+
+    median: float
+    worst: float
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A claim about contraction and the grounds for it.
+
+    Attributes:
+        claim: How much is known.
+        metric: The Riemannian metric in which trajectories approach each other.
+        rate_per_s: Proven rate τ [1/s]: distances in `metric` fall at least as fast as e^{-τt}; None if unproven.
+        reason: Why the claim holds, or why it is only measured.
+        overshoot: What the metric means in the robot's own coordinates.
+        audit: Measured numbers that bear on the claim.
+    """
+
+    claim: Claim
+    metric: str
+    rate_per_s: float | None
+    reason: str
+    overshoot: Overshoot | None = None
+    audit: Mapping[str, float] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain types, for JSON."""
+        return asdict(self) | {"claim": self.claim.value}
+
+
+def certify(model: ChartedField, states: States) -> Certificate:
+    """The certificate of a model.
+
+    Args:
+        model: The trained field.
+        states: Demonstrated states [m], where the overshoot is evaluated.
+    """
+    overshoot = chart_condition(model, states)
+    if isinstance(model.field, LinearField):
+        return Certificate(
+            Claim.by_construction,
+            "M(x) = Dψ(x)ᵀDψ(x), the pullback of the Euclidean metric through the chart ψ",
+            model.field.rate / model.time_unit_s,
+            "The field is linear in the coordinates z = ψ(x), and the symmetric part of its matrix is at most -τI for "
+            "every value of its parameters.",
+            overshoot,
+        )
+    return Certificate(
+        Claim.measured_only,
+        "Euclidean metric of the chart's coordinates",
+        None,
+        "The matrix field of Eq. (5.1) is negative definite, but it is in general not the Jacobian of the line "
+        "integral of Eq. (5.2): its rows are not gradients. Contraction is therefore measured on the true Jacobian.",
+        overshoot,
+    )
+
+
+def chart_condition(model: ChartedField, states: States) -> Overshoot:
+    """Condition number of Dψ at the given states: ‖x_t - y_t‖ ≤ condition · e^{-τt} ‖x_0 - y_0‖ locally."""
+    singular = torch.linalg.svdvals(inverse_chart_jacobian(model, states).double())
+    condition = singular[:, 0] / singular[:, -1]
+    return Overshoot(float(condition.median()), float(condition.max()))
+
+
+def inverse_chart_jacobian(model: ChartedField, x: States) -> Float[Tensor, "point D D"]:
+    """Dψ(x)⁻¹: the push-forward of each unit vector."""
+    with torch.no_grad():
+        _, push_forward = model.chart.linearise(x)
+        columns = [push_forward(unit.expand_as(x)) for unit in torch.eye(model.dim, dtype=x.dtype)]
+    return torch.stack(columns, dim=-1)

@@ -1,0 +1,130 @@
+"""The vector field of the thesis: the line integral of a negative definite matrix (Sec. 5.1)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import torch
+from torch import nn
+from torchdiffeq import odeint
+
+from geomotion.dynamics.quadrature import Integrand
+from geomotion.dynamics.regularisers import Regulariser
+from geomotion.types import Float, Matrix, State, Tensor, Velocity
+
+
+@runtime_checkable
+class LineIntegrator(Protocol):
+    """How the integral of Eq. (5.2) is computed; :class:`GaussLegendre` is the fast one."""
+
+    def __call__(self, integrand: Integrand, initial: State) -> State:
+        """`initial` plus the integral of `integrand` over [0, 1]."""
+        ...
+
+
+@dataclass(frozen=True)
+class RungeKutta4:
+    """torchdiffeq's fourth-order Runge-Kutta (3/8 rule) with equal steps.
+
+    Args:
+        steps: Number of steps over [0, 1].
+    """
+
+    steps: int
+
+    def __call__(self, integrand: Integrand, initial: State) -> State:
+        grid = torch.linspace(0, 1, self.steps + 1, dtype=initial.dtype, device=initial.device)
+        states: Tensor = odeint(_as_right_hand_side(integrand), initial, grid, method="rk4")
+        return states[-1]
+
+
+@dataclass(frozen=True)
+class DormandPrince:
+    """torchdiffeq's adaptive Runge-Kutta of order five.
+
+    The step is shared by the batch, and the tolerances hold for the root mean square over it.
+
+    Args:
+        relative_tolerance: Of the velocity.
+        absolute_tolerance: In the unit of the velocity.
+    """
+
+    relative_tolerance: float
+    absolute_tolerance: float
+
+    def __call__(self, integrand: Integrand, initial: State) -> State:
+        ends = torch.tensor([0.0, 1.0], dtype=initial.dtype, device=initial.device)
+        tolerances = {"rtol": self.relative_tolerance, "atol": self.absolute_tolerance}
+        states: Tensor = odeint(_as_right_hand_side(integrand), initial, ends, method="dopri5", **tolerances)
+        return states[-1]
+
+
+def _as_right_hand_side(integrand: Integrand) -> Callable[[Tensor, Tensor], Tensor]:
+    return lambda t, _: integrand(t[None]).squeeze(-2)
+
+
+class LineIntegralField(nn.Module):
+    r"""Neural contractive dynamical system: a negative definite matrix, integrated from a base point.
+
+    .. math::
+        \hat J(x) = -(J_\theta(x)^\top J_\theta(x) + \operatorname{diag} \varepsilon(x)), \qquad
+        f(x) = \dot x_0 + \int_0^1 \hat J(x_0 + t (x - x_0))\, (x - x_0)\, dt
+
+    For all parameters: sym Ĵ ≼ -min ε I, f(x₀) = ẋ₀, and (x - x₀)·(f(x) - f(x₀)) ≤ -min ε ‖x - x₀‖², up to the
+    error of the integrator. For D = 1 and for constant Ĵ, the Jacobian of f is Ĵ and f contracts.
+
+    Args:
+        jacobian_root: J_θ, from states (\*batch, D) to matrices (\*batch, D, D).
+        regulariser: ε.
+        base_point: x₀, shape (D,); learned if it is an ``nn.Parameter``, fixed otherwise.
+        base_velocity: ẋ₀, shape (D,); learned if it is an ``nn.Parameter``, fixed otherwise.
+        integrator: How the integral is computed.
+
+    Note:
+        For D ≥ 2 the claim that f contracts does not follow. The Jacobian of f is Ĵ only if every row of Ĵ is the
+        gradient of a function, which a network's rows are not; the symmetric part of ∂f/∂x can have positive
+        eigenvalues, and on networks trained on handwriting it mostly has. Contraction of f is therefore measured on
+        its true Jacobian, never read off Ĵ.
+
+    Source: Thesis Eq. (5.1), (5.2), (5.4).
+    """
+
+    base_point: Tensor
+    base_velocity: Tensor
+
+    def __init__(
+        self,
+        jacobian_root: Callable[[State], Matrix],
+        regulariser: Regulariser,
+        base_point: Float[Tensor, " D"],
+        base_velocity: Float[Tensor, " D"],
+        integrator: LineIntegrator,
+    ) -> None:
+        super().__init__()
+        self.dim = base_point.shape[0]
+        self.jacobian_root = jacobian_root
+        self.regulariser = regulariser
+        self.integrator = integrator
+        for name, value in (("base_point", base_point), ("base_velocity", base_velocity)):
+            if isinstance(value, nn.Parameter):
+                self.register_parameter(name, value)
+            else:
+                self.register_buffer(name, value)
+
+    def forward(self, x: State) -> Velocity:
+        direction = (x - self.base_point).unsqueeze(-2)
+
+        def integrand(t: Float[Tensor, " node"]) -> Float[Tensor, "*batch node D"]:
+            return self._contract(self.base_point + t[:, None] * direction, direction)
+
+        return self.integrator(integrand, self.base_velocity.expand_as(x))
+
+    def contraction_jacobian(self, x: State) -> Matrix:
+        """Ĵ(x) [1/time]; the Jacobian of this field only for D = 1 or constant Ĵ."""
+        root = self.jacobian_root(x)
+        return -(root.mT @ root + torch.diag_embed(self.regulariser(x)))
+
+    def _contract(self, x: State, vector: Float[Tensor, "#*batch D"]) -> State:
+        """Ĵ(x) v without forming Ĵ."""
+        root = self.jacobian_root(x)
+        return -(root.mT @ (root @ vector.unsqueeze(-1))).squeeze(-1) - self.regulariser(x) * vector

@@ -1,0 +1,111 @@
+"""Where the field contracts: largest eigenvalue of the symmetric part of its Jacobians."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import CenteredNorm, Normalize
+from matplotlib.figure import Figure
+
+from geomotion.figures.arrays import Array, EigenvalueGrid, EvaluationArrays
+from geomotion.figures.motion import draw_demonstrations
+from geomotion.figures.style import COLOUR, label_plane, new_figure, paper_style, percent
+
+COLOURMAP = "RdBu_r"  # blue contracts, red does not
+PERCENTILE = 95.0  # eigenvalues beyond it share the last colour, so that a few of them do not wash out the rest
+LABEL = r"$\lambda_{\max}$ of the symmetric part [1/s]"
+BINS = 40
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One Jacobian: its name and its largest eigenvalues [1/s], shape (n,)."""
+
+    name: str
+    eigenvalues: Array
+
+    @property
+    def share_not_contracting(self) -> float:
+        """Share of the points where the largest eigenvalue is not negative."""
+        return float(np.mean(self.eigenvalues >= 0))
+
+    @property
+    def title(self) -> str:
+        """Name and share."""
+        return f"{self.name}\n{percent(self.share_not_contracting)} of {len(self.eigenvalues)} points not contracting"
+
+
+def panels(grid: EigenvalueGrid) -> list[Panel]:
+    """The Jacobians to compare; the claimed metric is left out where it is the Euclidean one."""
+    chosen = [Panel("true Jacobian, robot coordinates", grid.true)]
+    if not np.allclose(grid.true, grid.claimed):
+        chosen.append(Panel("true Jacobian, claimed metric", grid.claimed))
+    if grid.jhat is not None:
+        chosen.append(Panel(r"$\hat{J}$ of the network, Eq. (5.1)", grid.jhat))
+    return chosen
+
+
+def robust_norm(values: list[Array]) -> CenteredNorm:
+    """Colour scale around 0 shared by several panels, cut at a percentile of the magnitudes."""
+    magnitude = float(np.percentile(np.abs(np.concatenate(values)), PERCENTILE))
+    return CenteredNorm(0.0, magnitude or 1.0)
+
+
+def draw_eigenvalue_map(ax: Axes, points: Array, shape: tuple[int, ...], panel: Panel, norm: Normalize) -> Axes:
+    """Draw eigenvalues on a planar grid; the area that does not contract is hatched and outlined."""
+    order = np.lexsort((points[:, 0], points[:, 1]))
+    x, y, eigenvalues = (column[order].reshape(shape) for column in (points[:, 0], points[:, 1], panel.eigenvalues))
+    ax.pcolormesh(x, y, eigenvalues, norm=norm, cmap=COLOURMAP, shading="nearest", rasterized=True)
+    if panel.eigenvalues.min() < 0 <= panel.eigenvalues.max():
+        ax.contourf(x, y, eigenvalues, levels=[0, np.inf], colors="none", hatches=["////"])
+        ax.contour(x, y, eigenvalues, levels=[0], colors="black", linewidths=1.2)
+    ax.set_title(panel.title)
+    label_plane(ax)
+    return ax
+
+
+def draw_eigenvalue_distribution(ax: Axes, panel: Panel, limit: float) -> Axes:
+    """Draw a histogram of eigenvalues within ±`limit` [1/s]; those beyond it are counted in the outermost bins."""
+    edges = np.linspace(-limit, limit, BINS + 1)
+    counts, _ = np.histogram(np.clip(panel.eigenvalues, -limit, limit), edges)
+    colours = np.where(edges[:-1] >= 0, COLOUR["expanding"], COLOUR["contracting"])
+    ax.bar(edges[:-1], counts, np.diff(edges), align="edge", color=colours)
+    ax.axvline(0, color="black", linewidth=0.8)
+    ax.set_title(panel.title)
+    ax.set(xlabel=LABEL, ylabel="points [1]")
+    return ax
+
+
+@paper_style()
+def figure_eigenvalues(data: EvaluationArrays) -> Figure:
+    """Maps for planar grids, histograms for scattered points of more dimensions.
+
+    `data.eigenvalues` has to be present.
+    """
+    grid = data.eigenvalues
+    assert grid is not None
+    return _figure_maps(data, grid) if len(grid.shape) == 2 else _figure_distributions(grid)
+
+
+def _figure_maps(data: EvaluationArrays, grid: EigenvalueGrid) -> Figure:
+    shown = panels(grid)
+    norm = robust_norm([panel.eigenvalues for panel in shown])
+    figure = new_figure(width_mm=65 * len(shown) + 25, height_mm=75)
+    axes = figure.subplots(1, len(shown), sharex=True, sharey=True, squeeze=False)[0]
+    for ax, panel in zip(axes, shown, strict=True):
+        draw_eigenvalue_map(ax, grid.points, grid.shape, panel, norm)
+        draw_demonstrations(ax, data.judged)
+        ax.label_outer()
+    figure.colorbar(ScalarMappable(norm, COLOURMAP), ax=axes, label=LABEL, extend="both", shrink=0.9)
+    return figure
+
+
+def _figure_distributions(grid: EigenvalueGrid) -> Figure:
+    shown = panels(grid)
+    limit = robust_norm([panel.eigenvalues for panel in shown]).halfrange
+    figure = new_figure(width_mm=150, height_mm=10 + 45 * len(shown))
+    for ax, panel in zip(figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0], shown, strict=True):
+        draw_eigenvalue_distribution(ax, panel, limit)
+        ax.label_outer()
+    return figure

@@ -1,0 +1,119 @@
+"""One look for all figures: sizes in millimetres, one meaning per colour, three files per picture.
+
+Nothing global changes on import: figures are made under ``@paper_style()`` and with ``Figure()``, without pyplot.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, cast
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
+
+from geomotion.files import atomic
+
+MM_PER_INCH = 25.4
+PNG_DPI = 200
+
+FONTS: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7,
+    "mathtext.fontset": "dejavusans",
+    "pdf.fonttype": 42,  # text stays text in the PDF, as journals ask
+}
+LINES: dict[str, Any] = {
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.linewidth": 1.2,
+    "hatch.linewidth": 0.4,
+    "legend.frameon": False,
+}
+PAPER: dict[str, Any] = FONTS | LINES
+
+# Okabe-Ito where a colour is needed: they stay apart for colour-blind readers, and line styles repeat the distinction.
+COLOUR: Mapping[str, str] = MappingProxyType(
+    {
+        "demonstration": "black",
+        "field": "0.72",
+        "rollout": "#E69F00",  # from demonstration starts
+        "grid": "#009E73",  # from grid or random starts
+        "outside": "#9FD8C6",  # the same, where it is outside the demonstration region
+        "region": "#EFEFEF",
+        "obstacle": "#D55E00",
+        "riemannian": "#0072B2",
+        "euclidean": "0.35",
+        "contracting": "#4393C3",
+        "expanding": "#B2182B",
+    }
+)
+# For quantities without a colour of their own.
+SEQUENCE = ("#0072B2", "#CC79A7", "#56B4E9", "#D55E00", "#009E73", "#E69F00")
+
+
+@contextmanager
+def paper_style() -> Iterator[None]:
+    """The look of a paper, as a context or as a decorator: ``@paper_style()``."""
+    with rc_context(cast(Any, PAPER)):  # matplotlib types each key as a literal, which merged dictionaries lose
+        yield
+
+
+def new_figure(width_mm: float, height_mm: float) -> Figure:
+    """An empty figure that is not known to pyplot."""
+    return Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
+
+
+def state_label(axis: int) -> str:
+    """Label of a coordinate with its unit."""
+    return rf"$x_{{{axis + 1}}}$ [m]"
+
+
+def label_plane(ax: Axes) -> None:
+    """Label the axes of a plane of states, with equal scales and few enough ticks not to touch."""
+    ax.set(xlabel=state_label(0), ylabel=state_label(1), aspect="equal")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(MaxNLocator(nbins=5))
+
+
+def percent(share: float) -> str:
+    """A share as a percentage with one decimal, exact at the ends: 0 % and 100 % mean none and all."""
+    if share in (0.0, 1.0):
+        return f"{share:.0%}"
+    return f"{min(max(share, 0.001), 0.999):.1%}"
+
+
+def save_figure(figure: Figure, folder: Path, name: str, data: Mapping[str, ArrayLike]) -> list[str]:
+    """Write a figure as PNG and PDF, and the numbers behind it as NPZ.
+
+    Args:
+        figure: What to save.
+        folder: Where to; made if needed.
+        name: File name without suffix.
+        data: The arrays that were drawn.
+
+    Returns:
+        The names of the three files.
+
+    Raises:
+        DiskFull: If space ran out.
+    """
+    with paper_style():
+        for suffix, options in ((".png", {"dpi": PNG_DPI}), (".pdf", {"metadata": {"CreationDate": None}})):
+            with atomic(folder / f"{name}{suffix}") as temporary:
+                figure.savefig(temporary, **options)
+    with atomic(folder / f"{name}.npz") as temporary:
+        np.savez_compressed(temporary, **{key: np.asarray(values) for key, values in data.items()})
+    return [f"{name}{suffix}" for suffix in (".png", ".pdf", ".npz")]

@@ -1,0 +1,209 @@
+"""Models from configuration, and the file they are kept in."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from geomotion import config as schema
+from geomotion.dynamics.charts import AnchoredChart, ComposedChart, IdentityChart, ScalingChart
+from geomotion.dynamics.fields import Chart, ChartedField, VectorField
+from geomotion.dynamics.line_integral import LineIntegralField
+from geomotion.dynamics.linear import LinearField
+from geomotion.dynamics.regularisers import ConstantRegulariser, StateIndependentRegulariser
+from geomotion.errors import CorruptArtefact, InvalidSetting
+from geomotion.files import atomic
+from geomotion.networks.coupling import CouplingFlow
+from geomotion.networks.mlp import JacobianRoot
+from geomotion.training.data import Geometry
+
+FORMAT = 1  # of the model file; raised when older files can no longer be read
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """Everything that decides a model's architecture.
+
+    Attributes:
+        chart: ψ.
+        field: The field in its coordinates.
+        regulariser: ε of a line-integral field.
+        seed: Seed of the initial parameters.
+    """
+
+    chart: schema.ChartConfig
+    field: schema.FieldConfig
+    regulariser: schema.RegulariserConfig
+    seed: int
+
+
+@dataclass(frozen=True)
+class Skill:
+    """A trained field with what is needed to use and to judge it.
+
+    Attributes:
+        field: The field in robot coordinates [m] and [m/s].
+        geometry: Place, size and time scale of the demonstrations.
+        state_channels: Channels of the demonstrations that make up the state.
+        train_demos: Numbers of the demonstrations it was fitted to.
+        test_demos: Numbers of those that were held out.
+    """
+
+    field: ChartedField
+    config: ModelConfig
+    geometry: Geometry
+    state_channels: tuple[str, ...]
+    train_demos: tuple[int, ...]
+    test_demos: tuple[int, ...]
+
+    @property
+    def goal(self) -> torch.Tensor:
+        """Where the demonstrations end, shape (D,) [m], in the model's precision."""
+        return torch.tensor(self.geometry.goal, dtype=next(self.field.parameters()).dtype)
+
+
+def build(config: ModelConfig, geometry: Geometry) -> ChartedField:
+    """An untrained model; the same seed gives the same parameters.
+
+    Raises:
+        InvalidSetting: If chart, field and regulariser do not go together.
+    """
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        scaling = ScalingChart(torch.tensor(geometry.centre), geometry.scale_m)
+        chart = ComposedChart(scaling, _chart(config.chart, scaling.dim))
+        match config.field:
+            case schema.LinearField() as linear:
+                _refuse_regulariser(config.regulariser)
+                field: VectorField = LinearField(
+                    scaling.dim, linear.min_rate_per_duration, linear.initial_rate_per_duration
+                )
+                anchored: Chart = AnchoredChart(chart, torch.tensor(geometry.goal))
+                return ChartedField(anchored, field, geometry.duration_s)
+            case schema.LineIntegralField() as integral:
+                field = _line_integral(integral, config.regulariser, chart, geometry)
+                return ChartedField(chart, field, geometry.duration_s)
+            case unknown:
+                raise TypeError(f"no builder for {type(unknown).__name__}")
+
+
+def _chart(config: schema.ChartConfig, dim: int) -> Chart:
+    match config:
+        case schema.IdentityChart():
+            return IdentityChart(dim)
+        case schema.FlowChart():
+            if dim < 2:
+                raise InvalidSetting("chart", "flow", "at least two coordinates; use chart=identity in one dimension")
+            return CouplingFlow(dim, config.layers, config.features, config.length_scale, config.log_scale_cap)
+        case unknown:
+            raise TypeError(f"no builder for {type(unknown).__name__}")
+
+
+def _line_integral(
+    config: schema.LineIntegralField, regulariser: schema.RegulariserConfig, chart: Chart, geometry: Geometry
+) -> LineIntegralField:
+    dim = chart.dim
+    base = torch.tensor(geometry.goal if config.base_point is schema.BasePoint.target else geometry.mean)
+    with torch.no_grad():
+        base_point = chart.to_latent(base)
+    return LineIntegralField(
+        JacobianRoot(dim, tuple(config.hidden_units), config.activation.value),
+        _regulariser(regulariser, dim),
+        base_point,
+        learn_base_point=config.base_point is schema.BasePoint.learned,
+        learn_base_velocity=config.base_velocity is schema.BaseVelocity.learned,
+        integrator=config.integrator.value,
+        nodes=config.nodes,
+        relative_tolerance=config.relative_tolerance,
+        absolute_tolerance=config.absolute_tolerance,
+    )
+
+
+def _regulariser(config: schema.RegulariserConfig, dim: int) -> nn.Module:
+    match config:
+        case schema.ConstantRegulariser():
+            return ConstantRegulariser(config.epsilon, dim)
+        case schema.StateIndependentRegulariser():
+            return StateIndependentRegulariser(config.initial_epsilon, dim, config.spread_weight, config.spread_limit)
+        case _:
+            raise InvalidSetting("regulariser", "none", "constant or state_independent for field=line_integral")
+
+
+def _refuse_regulariser(config: schema.RegulariserConfig) -> None:
+    if not isinstance(config, schema.NoRegulariser):
+        raise InvalidSetting(
+            "regulariser", type(config).__name__, "none: a linear field contracts by construction; its rate is field.min_rate_per_duration"
+        )
+
+
+def save(path: Path, skill: Skill) -> None:
+    """Write a model: parameters, architecture and scaling in one file."""
+    document = {
+        "format": FORMAT,
+        "config": schema.plain(skill.config),
+        "geometry": asdict(skill.geometry),
+        "state_channels": list(skill.state_channels),
+        "train_demos": list(skill.train_demos),
+        "test_demos": list(skill.test_demos),
+        "parameters": skill.field.state_dict(),
+    }
+    with atomic(path) as temporary:
+        torch.save(document, temporary)
+
+
+def load(path: Path) -> Skill:
+    """Read a model.
+
+    Raises:
+        CorruptArtefact: If the file is damaged or of another format.
+    """
+    try:
+        document = torch.load(path, weights_only=True)
+        if document["format"] != FORMAT:
+            raise CorruptArtefact(path, f"model format {document['format']}, this version reads {FORMAT}")
+        geometry = Geometry(**{name: _tuple(value) for name, value in document["geometry"].items()})
+        config = _model_config(document["config"])
+        field = build(config, geometry)
+        field.load_state_dict(document["parameters"])
+    except CorruptArtefact:
+        raise
+    except Exception as error:  # torch reports damage by many types
+        raise CorruptArtefact(path, "this model file cannot be read") from error
+    field.eval()
+    return Skill(
+        field,
+        config,
+        geometry,
+        tuple(document["state_channels"]),
+        tuple(document["train_demos"]),
+        tuple(document["test_demos"]),
+    )
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list | tuple) else value
+
+
+def _model_config(document: Mapping[str, Any]) -> ModelConfig:
+    parts = {name: _component(document[name]) for name in ("chart", "field", "regulariser")}
+    return ModelConfig(**parts, seed=int(document["seed"]))
+
+
+def _component(document: Mapping[str, Any]) -> Any:
+    """A configuration object from its plain form; the set of kinds is closed."""
+    kinds: Sequence[type] = (
+        schema.IdentityChart, schema.FlowChart, schema.LinearField, schema.LineIntegralField,
+        schema.NoRegulariser, schema.ConstantRegulariser, schema.StateIndependentRegulariser,
+    )  # fmt: skip
+    kind = {kind.__name__: kind for kind in kinds}[document["kind"]]
+    values = {name: value for name, value in document.items() if name != "kind"}
+    for name, enum in (
+        ("activation", schema.Activation), ("base_point", schema.BasePoint),
+        ("base_velocity", schema.BaseVelocity), ("integrator", schema.Integrator),
+    ):  # fmt: skip
+        if name in values:
+            values[name] = enum(values[name])
+    return kind(**values)

@@ -1,0 +1,1 @@
+"""Networks that supply the functions the mathematics asks for."""

@@ -1,0 +1,65 @@
+"""True Jacobians of fields, by automatic differentiation, and the eigenvalues that decide about contraction."""
+
+from collections.abc import Callable
+
+import torch
+from torch.func import jvp
+
+from geomotion.dynamics.fields import Chart
+from geomotion.types import Float, States, Tensor
+
+Map = Callable[[Tensor], Tensor]
+Jacobians = Float[Tensor, "point D D"]
+Eigenvalues = Float[Tensor, "point D"]
+
+
+def field_jacobian(function: Map, x: States) -> Jacobians:
+    """∂f/∂x at each point, by one backward pass per output over the whole batch.
+
+    Backward passes ask nothing of `function` but to be differentiable, and to treat the rows of a batch
+    independently; charts that linearise into a closure are fine.
+    """
+    with torch.enable_grad():
+        x = x.detach().requires_grad_()
+        outputs = function(x).sum(dim=0)
+        rows = [torch.autograd.grad(output, x, retain_graph=True, materialize_grads=True)[0] for output in outputs]
+    return torch.stack(rows, dim=1)
+
+
+def symmetric_eigenvalues(jacobians: Jacobians) -> Eigenvalues:
+    """Eigenvalues of (J + Jᵀ)/2, ascending; all negative: the field contracts there in the Euclidean metric.
+
+    Source:
+        Thesis Eq. (2.15), with the identity as metric.
+    """
+    return torch.linalg.eigvalsh((jacobians + jacobians.mT) / 2)
+
+
+def eigenvalues_in_metric(field: Map, chart: Chart, x: States) -> Eigenvalues:
+    r"""Contraction of a field in the metric of a chart, computed in the robot's coordinates.
+
+    .. math:: \tfrac12 (M J + J^\top M + \dot M)\, v = \lambda M v, \qquad M = D\psi^\top D\psi
+
+    The result equals :func:`symmetric_eigenvalues` of the latent field's Jacobian where there is a latent field;
+    this form also serves fields that were changed in the robot's coordinates. It is slower: second derivatives
+    of the chart, one column at a time.
+
+    Returns:
+        Generalised eigenvalues, ascending [1/s for a field in units per second].
+
+    Source:
+        Thesis Eq. (2.15).
+    """
+    jacobians = field_jacobian(field, x)
+    velocities = field(x).detach()
+    columns = [
+        jvp(lambda y, axis=axis: jvp(chart.to_latent, (y,), (axis.expand_as(y),))[1], (x,), (velocities,))
+        for axis in torch.eye(x.shape[1], dtype=x.dtype, device=x.device)
+    ]
+    chart_jacobian = torch.stack([value for value, _ in columns], dim=2)
+    chart_jacobian_rate = torch.stack([rate for _, rate in columns], dim=2)
+    metric = chart_jacobian.mT @ chart_jacobian
+    # sym(MJ) + Ṁ/2 is the symmetric part of MJ + Dψᵀ d/dt Dψ
+    form = metric @ jacobians + chart_jacobian.mT @ chart_jacobian_rate
+    inverse_root = torch.linalg.inv(torch.linalg.cholesky(metric))
+    return symmetric_eigenvalues(inverse_root @ form @ inverse_root.mT).detach()

@@ -1,0 +1,171 @@
+"""How well rollouts from the demonstrations' own starts reproduce them, beside what repetitions of people reach."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from geomotion.scores import baselines, curves
+from geomotion.scores.evaluation import Evaluation, Unit
+from geomotion.scores.score import Score, mean_score, summary_score
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One demonstration with what the model makes of it.
+
+    Attributes:
+        time_s: Time after the start [s].
+        states: Demonstrated states [m].
+        velocities: Their velocities [m/s].
+        rollout: The model's states at the same times, from the demonstration's own start [m].
+        predicted_velocities: The model's velocities at the demonstrated states [m/s].
+        is_trained: Whether the model was fitted to it.
+    """
+
+    time_s: Float[np.ndarray, " time"]
+    states: Float[np.ndarray, "time D"]
+    velocities: Float[np.ndarray, "time D"]
+    rollout: Float[np.ndarray, "time D"]
+    predicted_velocities: Float[np.ndarray, "time D"]
+    is_trained: bool
+
+
+CURVE_SCORES: dict[str, tuple[Callable[[curves.Curve, curves.Curve], float], str]] = {
+    "dtwd_per_point": (curves.dtwd_per_point, "Sec. 6.4, each direction divided by its number of points"),
+    "dtwd_sum": (curves.dtwd_sum, "Sec. 6.4, summed over the points of both curves"),
+    "dtw": (lambda curve, other: curves.dynamic_time_warping(curve, other).mean, "monotone, mean along the path"),
+    "dtw_sum": (lambda curve, other: curves.dynamic_time_warping(curve, other).cost, "monotone, sum along the path"),
+    "frechet": (curves.discrete_frechet, "discrete"),
+    "start_error": (curves.start_error, "jump between the given start and the first state"),
+    "end_point_error": (curves.end_point_error, "at the demonstration's own duration"),
+    "time_aligned_rmse": (curves.root_mean_square_error, "at equal times"),
+}
+
+
+def judge_reproduction(judged: Sequence[Judged], unit: Unit) -> Evaluation:
+    """Scores of trained demonstrations (``train.``) and of held-out ones (``heldout.``), each with its baselines.
+
+    Args:
+        judged: Trained demonstrations, at least one, and held-out ones, if any.
+        unit: Unit in which distances are reported.
+    """
+    trained = [one for one in judged if one.is_trained]
+    heldout = [one for one in judged if not one.is_trained]
+    scores = _subset_scores("train", trained, unit)
+    omitted = {}
+    if len(trained) > 1:
+        scores |= _train_baselines(trained, scores["train.dtwd_per_point"], unit)
+    else:
+        omitted["train.dtwd_ratio"] = "baselines need at least two training demonstrations"
+    if heldout:
+        scores |= _subset_scores("heldout", heldout, unit)
+        scores |= _heldout_baselines(heldout, trained, scores["heldout.dtwd_per_point"], unit)
+    else:
+        omitted["heldout"] = "no held-out demonstration is judged"
+    return Evaluation(scores, _arrays([*trained, *heldout]), omitted)
+
+
+def _subset_scores(subset: str, judged: Sequence[Judged], unit: Unit) -> dict[str, Score]:
+    lengths = sorted({len(one.time_s) for one in judged})
+    points = f"{lengths[0]} points" if len(lengths) == 1 else f"{lengths[0]} to {lengths[-1]} points"
+    scores = {}
+    for name, (distance, meaning) in CURVE_SCORES.items():
+        values = [unit.per_state_unit * distance(one.rollout, one.states) for one in judged]
+        scores[f"{subset}.{name}"] = mean_score(values, unit.name, f"{meaning}; {points} a curve, unscaled")
+    predictions = [(one.predicted_velocities, one.velocities) for one in judged]
+    absolute = _pooled(curves.root_mean_square_error, predictions, f"{unit.name}/s", "on the demonstrated states")
+    scores[f"{subset}.velocity_rmse"] = _rescaled(absolute, unit.per_state_unit)
+    scores[f"{subset}.relative_velocity_error"] = _pooled(
+        curves.relative_error, predictions, "1", "sqrt(mean|v - v'|^2 / mean|v|^2) on the demonstrated states"
+    )
+    return scores
+
+
+def _train_baselines(trained: Sequence[Judged], reached: Score, unit: Unit) -> dict[str, Score]:
+    demos = [one.states for one in trained]
+    between = unit.per_state_unit * baselines.distances_between(demos)
+    nearest = unit.per_state_unit * baselines.distances_to_nearest(demos, demos)
+    predictions = []
+    for left_out in trained:
+        others = [one for one in trained if one is not left_out]
+        predictions.append((_nearest_velocities(left_out, others), left_out.velocities))
+    return {
+        "train.dtwd_ratio": Score(
+            reached.value / float(between.mean()), "1", reached.count, reached.spread / float(between.mean()),
+            note="train.dtwd_per_point / train.dtwd_between_demos",
+        ),
+        "train.dtwd_between_demos": mean_score(between, unit.name, "baseline: every pair of training demonstrations"),
+        "train.dtwd_to_nearest_demo": mean_score(
+            nearest, unit.name, "baseline: the nearest other training demonstration in place of the rollout"
+        ),
+        "train.dtwd_of_averaged_demo": _averaged_demo_score(trained, trained, unit),
+        "train.nearest_neighbour_velocity_error": _pooled(
+            curves.relative_error, predictions, "1", "baseline: nearest state of the other training demonstrations"
+        ),
+    }  # fmt: skip
+
+
+def _heldout_baselines(
+    heldout: Sequence[Judged], trained: Sequence[Judged], reached: Score, unit: Unit
+) -> dict[str, Score]:
+    nearest = unit.per_state_unit * baselines.distances_to_nearest(
+        [one.states for one in heldout], [one.states for one in trained]
+    )
+    predictions = [(_nearest_velocities(one, trained), one.velocities) for one in heldout]
+    return {
+        "heldout.ratio_to_nearest_demo": Score(
+            reached.value / float(nearest.mean()), "1", reached.count, reached.spread / float(nearest.mean()),
+            note="heldout.dtwd_per_point / heldout.dtwd_to_nearest_demo",
+        ),
+        "heldout.dtwd_to_nearest_demo": mean_score(
+            nearest, unit.name, "baseline: the nearest training demonstration in place of the rollout"
+        ),
+        "heldout.dtwd_of_averaged_demo": _averaged_demo_score(heldout, trained, unit),
+        "heldout.nearest_neighbour_velocity_error": _pooled(
+            curves.relative_error, predictions, "1", "baseline: nearest state of the training demonstrations"
+        ),
+    }  # fmt: skip
+
+
+def _averaged_demo_score(judged: Sequence[Judged], trained: Sequence[Judged], unit: Unit) -> Score:
+    average = baselines.averaged_curve([one.states for one in trained], [one.time_s for one in trained])
+    values = [unit.per_state_unit * curves.dtwd_per_point(average, one.states) for one in judged]
+    return mean_score(values, unit.name, "baseline: mean of the training demonstrations at equal shares of duration")
+
+
+def _nearest_velocities(judged: Judged, known: Sequence[Judged]) -> curves.Curve:
+    return baselines.nearest_neighbour_velocities(
+        judged.states,
+        np.concatenate([one.states for one in known]),
+        np.concatenate([one.velocities for one in known]),
+    )
+
+
+def _pooled(
+    error: Callable[[curves.Curve, curves.Curve], float],
+    pairs: Sequence[tuple[curves.Curve, curves.Curve]],
+    unit: str,
+    note: str,
+) -> Score:
+    """An error over the points of all demonstrations; spread and values are those of single demonstrations."""
+    predicted, recorded = (np.concatenate(arrays) for arrays in zip(*pairs, strict=True))
+    return summary_score(error(predicted, recorded), [error(*pair) for pair in pairs], unit, "pooled", note)
+
+
+def _rescaled(score: Score, factor: float) -> Score:
+    values = [factor * value for value in score.values]
+    return summary_score(factor * score.value, values, score.unit, score.statistic, score.note)
+
+
+def _arrays(judged: Sequence[Judged]) -> dict[str, np.ndarray]:
+    arrays: dict[str, np.ndarray] = {}
+    for number, one in enumerate(judged):
+        arrays |= {
+            f"demo_{number}": one.states,
+            f"rollout_{number}": one.rollout,
+            f"time_{number}": one.time_s,
+            f"set_{number}": np.array("train" if one.is_trained else "test"),
+        }
+    return arrays

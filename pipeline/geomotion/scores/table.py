@@ -1,0 +1,47 @@
+"""Scores as plain text."""
+
+from collections.abc import Mapping
+from itertools import groupby
+from typing import Any
+
+TITLES = {
+    "train": "Training demonstrations, from their own starts",
+    "heldout": "Held-out demonstrations, from their own starts",
+    "contraction.true": "Contraction of the field in robot coordinates (true Jacobian; negative rates contract)",
+    "contraction.claimed": "Contraction in the coordinates where it is claimed (true Jacobian)",
+    "contraction.jhat": "The network's matrix of Eq. (5.1), which is not the Jacobian of the field",
+    "region": "Rollouts from a grid: steps in the region of the demonstrations, Eq. (6.10)",
+    "nearby.euclidean": "Rollouts from nearby starts, Euclidean distance",
+    "nearby.claimed": "Rollouts from nearby starts, distance in the claimed metric",
+    "goal": "Starts on a grid",
+}
+
+
+def scores_table(document: Mapping[str, Any]) -> str:
+    """The scores of a ``scores.json`` document, one line each, in groups; then what was left out, and why.
+
+    A spread is a standard deviation over the `n` values behind a score. What is neither a mean nor a share of
+    them is named in the last column.
+    """
+    lines = [f"{document['dataset']}, protocol {document['protocol']}"]
+    scores: Mapping[str, Mapping[str, Any]] = document["scores"]
+    width = max((len(name.rpartition(".")[2]) for name in scores), default=0)
+    for group, names in groupby(scores, key=lambda name: name.rpartition(".")[0]):
+        lines += ["", TITLES.get(group, group)]
+        lines += [_row(name.rpartition(".")[2], scores[name], width) for name in names]
+    if document["omitted"]:
+        lines += ["", "Left out"]
+        lines += [f"  {name}: {reason}" for name, reason in document["omitted"].items()]
+    return "\n".join(lines)
+
+
+def _row(name: str, score: Mapping[str, Any], width: int) -> str:
+    value = _number(score["value"])
+    spread = f"± {_number(score['spread'])}" if score["count"] > 1 and score["spread"] != 0 else ""
+    unit = "" if score["unit"] == "1" else score["unit"]
+    statistic = "" if score["statistic"] in {"mean", "share"} else score["statistic"]
+    return f"  {name:<{width}}  {value:>9} {spread:<10} {unit:<5}  n={score['count']:<5} {statistic}".rstrip()
+
+
+def _number(value: float | None) -> str:
+    return "not finite" if value is None else f"{value:.4g}"

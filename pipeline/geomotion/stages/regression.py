@@ -1,0 +1,72 @@
+"""The regression gate: scores of a pinned experiment against a stored baseline.
+
+A baseline is a JSON file: ``{"scores": {name: {"value": …, "better": "lower" | "higher", "tolerance": …,
+"reason": …}}}``; the tolerance is absolute, in the score's unit, and its reason stands beside it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from geomotion.config import CheckConfig
+from geomotion.errors import InvalidSetting, MissingData
+from geomotion.files import read_json, write_json
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Outcome of a check.
+
+    Attributes:
+        passed: Whether nothing got worse.
+        text: Table for people.
+        document: The same for programs.
+    """
+
+    passed: bool
+    text: str
+    document: dict[str, Any]
+
+
+def check(config: CheckConfig, scores: Mapping[str, Any]) -> Verdict:
+    """Compare scores with the baseline, or write them into it (``check.update=true``).
+
+    Raises:
+        InvalidSetting: If no baseline is named.
+        MissingData: If the named file does not exist.
+    """
+    if config.baseline is None:
+        raise InvalidSetting("check.baseline", "null", "a baseline file; experiment=regression/… names its own")
+    path = Path(config.baseline)
+    if not path.is_file():
+        raise MissingData(f"baseline {path}", "Run from the root of the repository, or name one with check.baseline=")
+    baseline = read_json(path)
+    rows = [_judge(name, expected, scores["scores"].get(name)) for name, expected in baseline["scores"].items()]
+    if config.update:
+        for row in rows:
+            if row["now"] is not None:
+                baseline["scores"][row["name"]]["value"] = row["now"]
+        write_json(path, baseline)
+    passed = config.update or all(row["verdict"] in ("ok", "better") for row in rows)
+    title = f"updated {path}" if config.update else ("nothing got worse" if passed else "WORSE than the baseline")
+    return Verdict(passed, f"{_table(rows)}\n\n{title}", {"passed": passed, "baseline": str(path), "rows": rows})
+
+
+def _judge(name: str, expected: Mapping[str, Any], found: Mapping[str, Any] | None) -> dict[str, Any]:
+    row = {"name": name, "baseline": expected["value"], "tolerance": expected["tolerance"], "now": None, "verdict": "missing"}
+    if found is not None:
+        sign = 1 if expected["better"] == "lower" else -1
+        change = sign * (found["value"] - expected["value"])
+        verdict = "worse" if change > expected["tolerance"] else "better" if change < -expected["tolerance"] else "ok"
+        row |= {"now": found["value"], "verdict": verdict}
+    return row
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    lines = [("score", "baseline", "now", "tolerance", "verdict")]
+    for row in rows:
+        now = "-" if row["now"] is None else f"{row['now']:.4g}"
+        lines.append((row["name"], f"{row['baseline']:.4g}", now, f"{row['tolerance']:.2g}", row["verdict"]))
+    widths = [max(len(line[column]) for line in lines) for column in range(5)]
+    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines)

@@ -1,0 +1,83 @@
+"""Fit a vector field to demonstrations."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import pandas as pd
+
+from geomotion import config as schema
+from geomotion import models
+from geomotion.demos import storage
+from geomotion.demos.split import split
+from geomotion.dynamics.certificate import certify
+from geomotion.errors import InvalidSetting
+from geomotion.figures.training import save_training_figure
+from geomotion.files import atomic, write_json
+from geomotion.models import ModelConfig, Skill
+from geomotion.tracking import Artefacts, StageRun
+from geomotion.training.data import Geometry, TrainingSet
+from geomotion.training.objectives import TrajectoryReproduction, VelocityReconstruction
+from geomotion.training.trainer import Objective, Schedule, fit
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """What the train stage needs.
+
+    Attributes:
+        state_channels: Channels of the demonstrations that make up the state.
+        train_demos: Numbers of the demonstrations to fit; None for the default split.
+        test_demos: Numbers of the held-out ones; None for the rest.
+        model: Architecture.
+        training: Objective and schedule.
+        seed: Seed of the optimisation.
+    """
+
+    state_channels: list[str]
+    train_demos: list[int] | None
+    test_demos: list[int] | None
+    model: ModelConfig
+    training: schema.TrainingConfig
+    seed: int
+
+
+def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
+    """Write ``model.pt``, ``policy.onnx``, ``certificate.json``, ``training.csv`` and its picture."""
+    demonstrations = storage.load(inputs["ingest"].folder)
+    train_demos, test_demos = split(config.train_demos, config.test_demos, demonstrations)
+    data = TrainingSet.from_demonstrations(demonstrations.select(train_demos), config.state_channels)
+    geometry = Geometry.of(data)
+    field = models.build(config.model, geometry)
+    history = fit(field, _objective(config, data, geometry), _schedule(config), run.checkpoint, run.log_series)
+
+    skill = Skill(field, config.model, geometry, tuple(config.state_channels), tuple(train_demos), tuple(test_demos))
+    models.save(run.folder / "model.pt", skill)
+    write_json(run.folder / "certificate.json", certify(field, data.all_states).as_dict())
+    curves = pd.DataFrame(history.rows)
+    with atomic(run.folder / "training.csv") as temporary:
+        curves.to_csv(temporary, index=False)
+    save_training_figure(curves, run.folder / "figures")
+
+
+def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Objective:
+    match config.training:
+        case schema.VelocityTraining() as velocity:
+            return VelocityReconstruction(data, geometry, velocity.batch_points)
+        case schema.TrajectoryTraining() as trajectory:
+            if not isinstance(config.model.field, schema.LinearField):
+                raise InvalidSetting("training", "trajectory", "velocity: this field has no closed-form trajectories")
+            return TrajectoryReproduction(data, geometry, trajectory)
+        case unknown:
+            raise TypeError(f"no objective for {type(unknown).__name__}")
+
+
+def _schedule(config: TrainConfig) -> Schedule:
+    training = config.training
+    return Schedule(
+        training.steps,
+        training.learning_rate,
+        training.gradient_clip,
+        training.checkpoint_every_steps,
+        training.log_every_steps,
+        config.seed,
+    )

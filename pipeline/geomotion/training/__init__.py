@@ -1,0 +1,1 @@
+"""Fitting fields to demonstrations: objectives and the one training loop."""

@@ -1,0 +1,142 @@
+"""The one training loop: fixed number of steps, seeded by step, checkpointed, resumed to the same result."""
+
+import math
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import torch
+from torch import Tensor, nn
+from tqdm import tqdm
+
+from geomotion.errors import CorruptArtefact, TrainingDiverged
+from geomotion.files import atomic
+from geomotion.interrupts import PendingInterrupt, postponed_interrupts
+
+Losses = Mapping[str, Tensor]
+Log = Callable[[int, Mapping[str, float]], None]
+
+
+class Objective(Protocol):
+    """What a model is fitted to."""
+
+    def __call__(self, model: nn.Module, progress: float, generator: torch.Generator) -> Losses:
+        """Weighted loss terms by name; the model minimises their sum.
+
+        Args:
+            model: The model.
+            progress: Share of the training that is done, in [0, 1).
+            generator: Source of all randomness of this step.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Numbers of the loop.
+
+    Attributes:
+        steps: Optimiser steps.
+        learning_rate: Of Adam, at the start; falls to zero along a cosine.
+        gradient_clip: Largest norm of the gradient.
+        checkpoint_every_steps: Steps between checkpoints.
+        log_every_steps: Steps between logged losses.
+        seed: Seed of every step's generator.
+    """
+
+    steps: int
+    learning_rate: float
+    gradient_clip: float
+    checkpoint_every_steps: int
+    log_every_steps: int
+    seed: int
+
+
+@dataclass
+class History:
+    """Logged losses: one row a logged step."""
+
+    rows: list[dict[str, float]] = field(default_factory=list)
+
+
+def fit(model: nn.Module, objective: Objective, schedule: Schedule, checkpoint: Path, log: Log) -> History:
+    """Train a model in place, continuing from `checkpoint` if there is one.
+
+    A signal is obeyed between two steps, after a checkpoint: the continued training ends in the same
+    parameters as an uninterrupted one.
+
+    Raises:
+        TrainingDiverged: If a loss is not finite.
+        Interrupted: If a signal arrived.
+        CorruptArtefact: If the checkpoint cannot be read.
+    """
+    optimiser = torch.optim.Adam(model.parameters(), schedule.learning_rate)
+    start, history = _restore(checkpoint, model, optimiser)
+    model.train()
+    with postponed_interrupts() as pending:
+        for step in _progress(start, schedule.steps):
+            losses = _step(model, objective, optimiser, schedule, step)
+            if step % schedule.log_every_steps == 0 or step == schedule.steps - 1:
+                history.rows.append(_record(step, losses, optimiser, log))
+            _checkpoint_if_due(checkpoint, step + 1, schedule, pending, model, optimiser, history)
+    model.eval()
+    return history
+
+
+def _step(
+    model: nn.Module, objective: Objective, optimiser: torch.optim.Optimizer, schedule: Schedule, step: int
+) -> Losses:
+    progress = step / schedule.steps
+    for group in optimiser.param_groups:
+        group["lr"] = schedule.learning_rate * (1 + math.cos(math.pi * progress)) / 2
+    losses = objective(model, progress, torch.Generator().manual_seed(schedule.seed * 1_000_003 + step))
+    total = torch.stack(list(losses.values())).sum()
+    if not torch.isfinite(total):
+        raise TrainingDiverged(step, float(total))
+    optimiser.zero_grad()
+    total.backward()
+    nn.utils.clip_grad_norm_(model.parameters(), schedule.gradient_clip)
+    optimiser.step()
+    return losses
+
+
+def _record(step: int, losses: Losses, optimiser: torch.optim.Optimizer, log: Log) -> dict[str, float]:
+    values = {name: float(loss.detach()) for name, loss in losses.items()}
+    row = {"total": sum(values.values()), **values, "learning_rate": optimiser.param_groups[0]["lr"]}
+    log(step, row)
+    return {"step": float(step), **row}
+
+
+def _checkpoint_if_due(
+    path: Path,
+    done: int,
+    schedule: Schedule,
+    pending: PendingInterrupt,
+    model: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    history: History,
+) -> None:
+    if pending.signal_number is not None or (done % schedule.checkpoint_every_steps == 0 and done < schedule.steps):
+        state = {"step": done, "model": model.state_dict(), "optimiser": optimiser.state_dict(), "history": history.rows}
+        with atomic(path) as temporary:
+            torch.save(state, temporary)
+    pending.raise_if_set()
+
+
+def _restore(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer) -> tuple[int, History]:
+    if not path.is_file():
+        return 0, History()
+    try:
+        state = torch.load(path, weights_only=True)
+        model.load_state_dict(state["model"])
+        optimiser.load_state_dict(state["optimiser"])
+        return int(state["step"]), History(state["history"])
+    except Exception as error:  # torch reports damage by many types
+        raise CorruptArtefact(path, "this checkpoint cannot be read") from error
+
+
+def _progress(start: int, steps: int) -> "tqdm[int]":
+    # disable=None: silent where standard error is not a terminal
+    return tqdm(range(start, steps), "train", steps, initial=start, unit="step", file=sys.stderr, leave=False, disable=None)

@@ -1,0 +1,178 @@
+import multiprocessing
+import signal
+from pathlib import Path
+
+import pytest
+
+from geomotion.config import TrackingConfig
+from geomotion.errors import CorruptArtefact, DiskFull, Interrupted, MissingArtefact, MissingRun, StoreUnavailable
+from geomotion.files import atomic
+from geomotion.tracking import Stage, Tracker
+from geomotion.tracking.artefacts import digest_of, run_key
+
+
+@pytest.fixture
+def config(fresh_store) -> TrackingConfig:
+    return TrackingConfig(root=str(fresh_store))
+
+
+class Counting:
+    """A stage that counts its executions and writes its configuration."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def __call__(self, config, inputs, run) -> None:
+        self.calls += 1
+        text = str(config) + "".join(found.path("value.txt").read_text() for found in inputs.values())
+        (run.folder / "value.txt").write_text(text)
+        run.log_series(1, {"loss": 0.5})
+
+
+def execute(config, stage, settings, inputs=None, reuse=True):
+    tracker = Tracker(config, reuse)
+    with tracker.command("ncds test", settings, []) as command:
+        return tracker.run_stage(stage, settings, inputs or {}, command)
+
+
+def test_a_finished_stage_with_the_same_key_is_reused(config):
+    work = Counting()
+    first = execute(config, Stage("train", work), {"steps": 1})
+    second = execute(config, Stage("train", work), {"steps": 1})
+    assert first == second
+    assert work.calls == 1
+    assert first.path("value.txt").read_text() == "{'steps': 1}"
+
+
+def test_another_configuration_or_input_or_reuse_false_repeats_the_stage(config):
+    work = Counting()
+    stage = Stage("train", work)
+    first = execute(config, stage, {"steps": 1})
+    execute(config, stage, {"steps": 2})
+    execute(config, stage, {"steps": 1}, {"ingest": first})
+    execute(config, stage, {"steps": 1}, reuse=False)
+    assert work.calls == 4
+
+
+def test_a_stage_that_reads_outside_is_repeated_but_kept_once(config):
+    work = Counting()
+    stage = Stage("ingest", work, reads_outside=True)
+    first, second = execute(config, stage, {}), execute(config, stage, {})
+    assert work.calls == 2
+    assert first.run_id == second.run_id
+
+
+def test_the_key_depends_on_configuration_and_inputs_only():
+    assert run_key("train", {"a": 1, "b": 2}, {}) == run_key("train", {"b": 2, "a": 1}, {})
+    assert run_key("train", {"a": 1}, {}) != run_key("train", {"a": 2}, {})
+    assert run_key("train", {"a": 1}, {}) != run_key("evaluate", {"a": 1}, {})
+
+
+def test_a_changed_file_is_noticed_before_it_is_used(config):
+    first = execute(config, Stage("ingest", Counting()), {})
+    (first.folder / "value.txt").write_text("tampered")
+    with pytest.raises(CorruptArtefact, match="ingest"):
+        execute(config, Stage("train", Counting()), {}, {"ingest": first})
+
+
+def test_pictures_and_records_do_not_count_in_the_digest(tmp_path):
+    (tmp_path / "model.pt").write_text("weights")
+    before = digest_of(tmp_path)
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "a.pdf").write_text("today's date")
+    assert digest_of(tmp_path) == before
+    (tmp_path / "model.pt").write_text("other weights")
+    assert digest_of(tmp_path) != before
+
+
+def test_a_failing_stage_marks_both_runs_failed_and_leaves_no_artefacts(config):
+    def fail(settings, inputs, run):
+        (run.folder / "half.txt").write_text("half")
+        raise ValueError("broken")
+
+    with pytest.raises(ValueError, match="broken"):
+        execute(config, Stage("train", fail), {})
+    tracker = Tracker(config)
+    runs = tracker.client.search_runs([tracker.experiment_id])
+    assert {run.info.status for run in runs} == {"FAILED"}
+    assert all("broken" in run.data.tags["geomotion.error"] for run in runs)
+    assert not list(Path(config.root).rglob("half.txt"))
+
+
+def test_a_stopped_stage_is_marked_killed_and_continued_in_the_same_run(config):
+    def stop(settings, inputs, run):
+        run.checkpoint.write_text("halfway")
+        raise Interrupted(signal.SIGTERM, "again")
+
+    def resume(settings, inputs, run):
+        (run.folder / "value.txt").write_text(run.checkpoint.read_text() + " and done")
+
+    with pytest.raises(Interrupted):
+        execute(config, Stage("train", stop), {})
+    tracker = Tracker(config)
+    stopped = tracker.client.search_runs([tracker.experiment_id], "tags.`geomotion.stage` = 'train'")
+    assert [run.info.status for run in stopped] == ["KILLED"]
+    finished = execute(config, Stage("train", resume), {})
+    assert finished.run_id == stopped[0].info.run_id
+    assert finished.path("value.txt").read_text() == "halfway and done"
+    assert not list((Path(config.root) / "work").glob("*.checkpoint"))
+
+
+def test_a_full_disk_fails_the_stage_with_one_clear_error(config, monkeypatch):
+    def write(settings, inputs, run):
+        with atomic(run.folder / "model.pt") as temporary:
+            temporary.write_bytes(b"x")
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(DiskFull, match="no space left while writing"):
+        execute(config, Stage("train", write), {})
+
+
+class TestLineage:
+    def test_latest_and_run_ids_and_paths_name_the_same_stages(self, config):
+        ingested = execute(config, Stage("ingest", Counting()), {})
+        trained = execute(config, Stage("train", Counting()), {}, {"ingest": ingested})
+        tracker = Tracker(config)
+        for name in ("latest", trained.run_id, trained.run_id[:8], str(trained.folder), str(trained.folder / "value.txt")):
+            assert tracker.lineage(name) == {"ingest": ingested, "train": trained}
+
+    def test_missing_runs_are_reported(self, config):
+        tracker = Tracker(config)
+        with pytest.raises(MissingRun, match="no finished training"):
+            tracker.lineage("latest")
+        with pytest.raises(MissingRun, match="no such run"):
+            tracker.lineage("deadbeef")
+        with pytest.raises(MissingRun, match="not inside the artefacts"):
+            tracker.lineage("/tmp")
+
+    def test_a_missing_file_names_the_stage_to_repeat(self, config):
+        with pytest.raises(MissingArtefact, match="ncds train reuse=false"):
+            execute(config, Stage("train", Counting()), {}).path("model.pt")
+
+
+class TestStore:
+    def test_a_file_that_is_no_database_is_reported(self, tmp_path):
+        (tmp_path / "mlflow.db").write_text("this is not SQLite " * 100)
+        with pytest.raises(StoreUnavailable, match="not an SQLite database"):
+            Tracker(TrackingConfig(root=str(tmp_path)))
+
+    def test_a_root_that_cannot_be_a_folder_is_reported(self, tmp_path):
+        (tmp_path / "file").write_text("")
+        with pytest.raises(StoreUnavailable):
+            Tracker(TrackingConfig(root=str(tmp_path / "file" / "runs")))
+
+    def test_two_processes_create_a_fresh_store_at_the_same_time(self, tmp_path):
+        context = multiprocessing.get_context("spawn")
+        processes = [context.Process(target=_use_store, args=(str(tmp_path),)) for _ in range(2)]
+        for process in processes:
+            process.start()
+        for process in processes:
+            process.join(120)
+        assert [process.exitcode for process in processes] == [0, 0]
+        tracker = Tracker(TrackingConfig(root=str(tmp_path)))
+        runs = tracker.client.search_runs([tracker.experiment_id], "tags.`geomotion.stage` = 'train'")
+        assert [run.info.status for run in runs] == ["FINISHED"]
+
+
+def _use_store(root: str) -> None:
+    execute(TrackingConfig(root=root), Stage("train", Counting()), {})
