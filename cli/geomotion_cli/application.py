@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import hydra
 from hydra._internal.utils import get_args_parser
@@ -18,17 +18,19 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from geomotion.config import GmsConfig, NcdsConfig, Output
+from geomotion.config import GmsConfig, Output
 from geomotion.errors import Interrupted
-from geomotion_cli.failures import Failure, Reporter, did_you_mean, pipeline_error, usage_error
-from geomotion_cli.hydra_errors import retell, unknown_key
+from geomotion_cli.failures import Failure, Reporter, UsageMistake, did_you_mean, pipeline_error, usage_error
+from geomotion_cli.hydra_errors import retell, unknown_setting
 from geomotion_cli.streams import hydras_remark_removed, output_to_stderr
 
 if TYPE_CHECKING:
     from geomotion.stages.commands import VerbResult
 
-RunVerb = Callable[[str, GmsConfig | NcdsConfig, list[str]], "VerbResult"]
+RunVerb = Callable[[str, GmsConfig, list[str]], "VerbResult"]
 """Carries out a verb with its typed configuration and the overrides that were typed."""
+
+Job = Callable[[DictConfig], float | None]
 
 
 class JobFailed(Exception):
@@ -37,10 +39,6 @@ class JobFailed(Exception):
     def __init__(self, exit_code: int) -> None:
         super().__init__(exit_code)
         self.exit_code = exit_code
-
-
-class UnreadableArguments(Exception):
-    """Flags that the command line does not have."""
 
 
 def run(program: str, verb: str, arguments: list[str], reporter: Reporter, run_verb: RunVerb | None = None) -> int:
@@ -56,19 +54,11 @@ def run(program: str, verb: str, arguments: list[str], reporter: Reporter, run_v
         return failed.exit_code
     except BrokenPipeError:
         raise
-    except UnreadableArguments as error:
-        return reporter.report(usage_error(str(error)), error)
-    except (HydraException, OmegaConfBaseException, ValueError) as error:
-        return reporter.report(usage_error(retell(error)), error)
-    except OSError as error:
-        return reporter.report(Failure("OSError", f"{error.filename}: {error.strerror}.", 1), error)
     except Exception as error:
-        return reporter.report(pipeline_error(error), error)
+        return reporter.report(_explain_before_job(error), error)
 
 
-def run_hydra(
-    program: str, command: str, arguments: list[str], job: Callable[[DictConfig], float | None] | None = None
-) -> int:
+def run_hydra(program: str, command: str, arguments: list[str], job: Job) -> int:
     """Hand `arguments` to Hydra under the name `command`; its errors are raised, not printed."""
     sys.argv = [command, *arguments]
     os.environ["HYDRA_FULL_ERROR"] = "1"
@@ -83,16 +73,16 @@ def run_hydra(
 
 def _check_flags(arguments: list[str]) -> None:
     """Refuse unknown flags in one line, before Hydra does it in twenty."""
+
+    def refuse(message: str) -> NoReturn:
+        raise UsageMistake(f"{message}; --help shows what there is.")
+
     parser = get_args_parser()
-
-    def refuse(message: str) -> None:
-        raise UnreadableArguments(f"{message}; --help shows what there is.")
-
-    parser.error = refuse
+    parser.error = refuse  # type: ignore[method-assign]
     known = [flag for action in parser._actions for flag in action.option_strings]
     unknown = [argument for argument in parser.parse_known_args(arguments)[1] if argument.startswith("-")]
     if unknown:
-        raise UnreadableArguments(f"unknown flag {unknown[0]!r}.{did_you_mean(unknown[0], [*known, '--debug'])}")
+        raise UsageMistake(f"unknown flag {unknown[0]!r}.{did_you_mean(unknown[0], [*known, '--debug'])}")
 
 
 def _run_job(verb: str, config: DictConfig, reporter: Reporter, run_verb: RunVerb | None) -> float | None:
@@ -100,16 +90,36 @@ def _run_job(verb: str, config: DictConfig, reporter: Reporter, run_verb: RunVer
         settings = _typed(config)
         with output_to_stderr():
             result = (run_verb or _pipeline())(verb, settings, list(HydraConfig.get().overrides.task))
+        text = _as_text(result, settings.output)
     except Interrupted as error:
         raise SystemExit(reporter.report(pipeline_error(error), error)) from None  # ends a sweep, too
-    except OmegaConfBaseException as error:
-        raise JobFailed(reporter.report(usage_error(retell(error)), error)) from None
     except Exception as error:
-        raise JobFailed(reporter.report(pipeline_error(error), error)) from None
-    _publish(result, settings.output)
+        raise JobFailed(reporter.report(_explain(error), error)) from None
+    print(text, flush=True)
     if result.exit_code:
         raise JobFailed(result.exit_code)
     return result.objective
+
+
+def _explain(error: Exception) -> Failure:
+    match error:
+        case UsageMistake():
+            return usage_error(str(error))
+        case HydraException() | OmegaConfBaseException():
+            return usage_error(retell(error))
+    return pipeline_error(error)
+
+
+def _explain_before_job(error: Exception) -> Failure:
+    match error:
+        case HydraException():  # some are OSErrors as well
+            return _explain(error)
+        case ValueError():  # how Hydra refuses some arguments
+            return usage_error(retell(error))
+        case OSError():  # its folder for jobs cannot be made
+            reason = f"cannot write {error.filename}: {error.strerror}. Set tracking.root= to another folder."
+            return Failure("StoreUnavailable", reason, 1)
+    return _explain(error)
 
 
 def _pipeline() -> RunVerb:
@@ -118,16 +128,15 @@ def _pipeline() -> RunVerb:
     return run_verb
 
 
-def _publish(result: "VerbResult", output: Output) -> None:
-    text = json.dumps(result.document, allow_nan=False) if output is Output.json else result.text
-    print(text, flush=True)
+def _as_text(result: "VerbResult", output: Output) -> str:
+    return json.dumps(result.document, allow_nan=False) if output is Output.json else result.text
 
 
-def _typed(config: DictConfig) -> GmsConfig | NcdsConfig:
+def _typed(config: DictConfig) -> GmsConfig:
     settings = OmegaConf.to_object(config)
     assert isinstance(settings, GmsConfig)
-    for key in _foreign_keys(settings):
-        raise UnknownSetting(unknown_key(key, config))
+    if foreign := _foreign_keys(settings):
+        raise UsageMistake(unknown_setting(foreign[0], config))
     return settings
 
 

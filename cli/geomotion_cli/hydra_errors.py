@@ -1,13 +1,16 @@
 """Hydra's and OmegaConf's errors, retold in one line that says what to write instead."""
 
 import re
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 
 from hydra.errors import HydraException, MissingConfigException, OverrideParseException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, MissingMandatoryValue, OmegaConfBaseException
 
+from geomotion.config import GmsConfig
 from geomotion.errors import UnknownName
-from geomotion_cli.choices import group_options
+from geomotion_cli.choices import group_options, top_level_names
 from geomotion_cli.failures import did_you_mean
 
 
@@ -27,19 +30,19 @@ def retell(error: Exception) -> str:
     return _first_sentence(error)
 
 
-def unknown_key(key: str, config: DictConfig) -> str:
+def unknown_setting(key: str, config: DictConfig) -> str:
     """One line about a key that the configuration does not have, with the nearest one that it has."""
     parent, _, name = key.rpartition(".")
-    siblings = _siblings(parent, config, OmegaConf.get_type(config))
-    same_name = [other for other in _dotted_keys(config) if other.endswith(f".{name}") and other != key]
-    near = [f"{parent}.{sibling}" if parent else sibling for sibling in siblings if sibling != name]
-    guess = f" Did you mean {same_name[0]!r}?" if same_name else did_you_mean(key, near)
-    return f"unknown setting {key!r}.{guess} Available{f' in {parent}' if parent else ''}: {', '.join(near) or 'none'}."
+    namesakes = [other for other in _all_settings(config) if other.endswith(f".{name}")]
+    siblings = _settings_in(config, parent)
+    guess = f" Did you mean {namesakes[0]!r}?" if namesakes else did_you_mean(key, siblings)
+    place = f" in {parent}" if parent else ""
+    return f"unknown setting {key!r}.{guess} Available{place}: {', '.join(siblings) or 'none'}."
 
 
 def _value_error(error: OmegaConfBaseException) -> str:
     if isinstance(error, ConfigAttributeError | ConfigKeyError) and error.full_key and error.parent_node is not None:
-        return unknown_key(error.full_key, error.parent_node._get_root())
+        return unknown_setting(error.full_key, error.parent_node._get_root())
     reason = _first_sentence(error)
     return f"{error.full_key}: {reason}" if error.full_key else reason
 
@@ -56,15 +59,22 @@ def _unknown_option(path: str, error: MissingConfigException) -> str:
 
 def _first_sentence(error: Exception) -> str:
     """The message without Hydra's search path, links and keys, on one line."""
-    told = re.split(r"\n(?:Config search path:|See https?://|\s*full_key:|\s*Available options)", str(error), maxsplit=1)[0]
+    told = re.split(
+        r"\n(?:Config search path:|See https?://|\s*full_key:|\s*Available options)", str(error), maxsplit=1
+    )[0]
     return "; ".join(line.strip() for line in told.splitlines() if line.strip())
 
 
-def _dotted_keys(config: DictConfig, prefix: str = "") -> list[str]:
-    keys: list[str] = []
-    for name in config:
-        key = f"{prefix}{name}"
-        keys.append(key)
-        if not OmegaConf.is_missing(config, name) and OmegaConf.is_dict(config._get_node(name)):
-            keys += _dotted_keys(config[name], f"{key}.")
-    return keys
+def _settings_in(config: DictConfig, parent: str = "") -> list[str]:
+    """Full keys of what is declared directly below `parent`."""
+    node = OmegaConf.select(config, parent, throw_on_resolution_failure=False) if parent else config
+    kind = OmegaConf.get_type(node) if OmegaConf.is_dict(node) else None
+    if not parent and kind is not None and issubclass(kind, GmsConfig):
+        return top_level_names(kind)
+    return [f"{parent}.{item.name}" for item in fields(kind)] if is_dataclass(kind) else []
+
+
+def _all_settings(config: DictConfig, parent: str = "") -> Iterator[str]:
+    for key in _settings_in(config, parent):
+        yield key
+        yield from _all_settings(config, key)

@@ -2,9 +2,9 @@
 
 import textwrap
 
+from geomotion.config import GmsConfig, NcdsConfig
 from geomotion_cli.choices import group_options, top_level_names
 from geomotion_cli.verbs import PROGRAMS
-from geomotion.config import GmsConfig, NcdsConfig
 
 CONFIG_TYPES: dict[str, type[GmsConfig]] = {"gms": GmsConfig, "ncds": NcdsConfig}
 FLAGS = {

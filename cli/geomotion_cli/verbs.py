@@ -60,7 +60,11 @@ PROGRAMS = {
             "run": Verb(
                 "the whole chain: ingest, train, rollout, eval, report",
                 {**_DATASET, **_MODEL, "experiment=thesis/ncds": "the thesis' own settings", **_TRAINING, **_JSON},
-                ("dataset=lasa/angle", "dataset=lasa/angle field=line_integral", "-m dataset=letters/c,letters/s seed=0,1"),
+                (
+                    "dataset=lasa/angle",
+                    "dataset=lasa/angle field=line_integral",
+                    "-m dataset=letters/c,letters/s seed=0,1",
+                ),
             ),
             "ingest": _INGEST,
             "train": Verb(
@@ -123,7 +127,7 @@ def overview(program: str) -> str:
             "Verbs:",
             *(f"  {name:<{width}}  {verb.summary}" for name, verb in verbs.items()),
             "",
-            f"More: {program} VERB --help shows a verb's settings, choices and examples; {program} --version the version.",
-            f'Tab completion: eval "$({program} -sc install=bash)" (zsh too; fish: {program} -sc install=fish | source).',
+            f"{program} VERB --help shows a verb's settings, choices and examples; {program} --version the version.",
+            f'Tab completion: eval "$({program} -sc install=bash)", or in fish: {program} -sc install=fish | source',
         ]
     )

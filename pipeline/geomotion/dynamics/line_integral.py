@@ -113,10 +113,8 @@ class LineIntegralField(nn.Module):
 
     def forward(self, x: State) -> Velocity:
         direction = (x - self.base_point).unsqueeze(-2)
-
-        def integrand(t: Float[Tensor, " node"]) -> Float[Tensor, "*batch node D"]:
-            return self._contract(self.base_point + t[:, None] * direction, direction)
-
+        # Not a nested def: its shape annotations would be evaluated in every call, for as long as a small network takes.
+        integrand: Integrand = lambda t: self._contract(self.base_point + t.unsqueeze(-1) * direction, direction)
         return self.integrator(integrand, self.base_velocity.expand_as(x))
 
     def contraction_jacobian(self, x: State) -> Matrix:

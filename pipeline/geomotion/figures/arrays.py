@@ -172,12 +172,8 @@ def _optional(arrays: Arrays, name: str) -> Array | None:
 
 
 def _judged(arrays: Arrays, number: int) -> Judged:
-    return Judged(
-        arrays[f"time_{number}"],
-        arrays[f"demo_{number}"],
-        arrays[f"rollout_{number}"],
-        str(arrays[f"set_{number}"]) != "train",
-    )
+    time_s, demonstration, rollout, subset = (arrays[f"{name}_{number}"] for name in ("time", "demo", "rollout", "set"))
+    return Judged(time_s, demonstration, rollout, str(subset) != "train")
 
 
 def _flow(arrays: Arrays) -> Flow | None:
@@ -188,13 +184,8 @@ def _eigenvalues(arrays: Arrays) -> EigenvalueGrid | None:
     if not _has(arrays, "grid_points", "true_eigenvalue", "claimed_eigenvalue"):
         return None
     shape = tuple(int(length) for length in arrays.get("grid_shape", np.empty(0)))
-    return EigenvalueGrid(
-        arrays["grid_points"],
-        shape,
-        arrays["true_eigenvalue"],
-        arrays["claimed_eigenvalue"],
-        _optional(arrays, "jhat_eigenvalue"),
-    )
+    jhat = _optional(arrays, "jhat_eigenvalue")
+    return EigenvalueGrid(arrays["grid_points"], shape, arrays["true_eigenvalue"], arrays["claimed_eigenvalue"], jhat)
 
 
 def _nearby(arrays: Arrays) -> Nearby | None:

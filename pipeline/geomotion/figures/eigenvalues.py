@@ -27,8 +27,8 @@ class Panel:
 
     @property
     def share_not_contracting(self) -> float:
-        """Share of the points where the largest eigenvalue is not negative."""
-        return float(np.mean(self.eigenvalues >= 0))
+        """Share of the points where the largest eigenvalue is not negative, or not a number."""
+        return float(np.mean(~(self.eigenvalues < 0)))
 
     @property
     def title(self) -> str:
@@ -48,7 +48,8 @@ def panels(grid: EigenvalueGrid) -> list[Panel]:
 
 def robust_norm(values: list[Array]) -> CenteredNorm:
     """Colour scale around 0 shared by several panels, cut at a percentile of the magnitudes."""
-    magnitude = float(np.percentile(np.abs(np.concatenate(values)), PERCENTILE))
+    magnitudes = np.abs(np.concatenate(values))
+    magnitude = float(np.percentile(magnitudes[np.isfinite(magnitudes)], PERCENTILE))
     return CenteredNorm(0.0, magnitude or 1.0)
 
 

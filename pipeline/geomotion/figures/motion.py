@@ -1,6 +1,7 @@
 """The learned motion: vector field, demonstrations and rollouts in a plane, or coordinates over time."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +13,7 @@ from geomotion.figures.style import COLOUR, label_plane, new_figure, paper_style
 
 GRID_ROLLOUTS = 8  # of those that start on the grid: enough to see where they go, few enough to see the field
 COLUMNS = 2
+DIVERGENCE_MARGIN = 0.3  # of the range of the demonstrations
 DASHES = (0, (3, 1.5))  # held-out rollouts
 
 
@@ -64,7 +66,10 @@ def draw_coordinate(ax: Axes, judged: Sequence[Judged], axis: int) -> Axes:
         states = item.demonstration[:, axis], item.rollout[:, axis]
         ax.plot(item.time_s, states[0], color=COLOUR["demonstration"], linestyle=demonstrated, linewidth=0.9)
         ax.plot(item.time_s, states[1], color=COLOUR["rollout"], linestyle=rolled, linewidth=1.2)
-    ax.set_ylabel(state_label(axis))
+    # a rollout that diverges may leave the axes, but not shrink everything else
+    values = np.concatenate([item.demonstration[:, axis] for item in judged])
+    margin = DIVERGENCE_MARGIN * (float(np.ptp(values)) or 1.0)
+    ax.set(ylabel=state_label(axis), ylim=(values.min() - margin, values.max() + margin))
     ax.margins(x=0.01)
     return ax
 
@@ -128,7 +133,7 @@ def _limits(values: Array) -> tuple[float, float]:
 
 
 def _legend(figure: Figure, data: EvaluationArrays) -> None:
-    def line(label: str, colour: str, style: object = "-") -> Line2D:
+    def line(label: str, colour: str, style: Any = "-") -> Line2D:
         return Line2D([], [], color=COLOUR[colour], linestyle=style, label=label)
 
     handles = [line("demonstration", "demonstration"), line("rollout from its start", "rollout")]

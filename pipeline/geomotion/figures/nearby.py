@@ -11,7 +11,7 @@ from geomotion.figures.style import COLOUR, new_figure, paper_style
 def relative(distance: Array, initial: float | None = None) -> Array:
     """Distances as multiples of the first one, or of `initial`; NaN where a logarithm has nothing to show."""
     reference = distance[0] if initial is None else initial
-    return np.where(distance > 0, distance, np.nan) / reference
+    return np.where((distance > 0) & np.isfinite(distance), distance, np.nan) / reference
 
 
 def draw_nearby(ax: Axes, nearby: Nearby, rate_per_s: float | None = None) -> Axes:

@@ -7,7 +7,7 @@ from matplotlib.patches import Polygon
 
 from geomotion.figures.arrays import Array, EvaluationArrays, Mask, Region
 from geomotion.figures.motion import draw_demonstrations
-from geomotion.figures.style import COLOUR, label_plane, new_figure, paper_style
+from geomotion.figures.style import COLOUR, label_plane, limit_to, new_figure, paper_style
 
 DRAWN_POINTS = 250  # per rollout; more are not visible and make the PDF heavy
 
@@ -16,12 +16,14 @@ def draw_region(ax: Axes, region: Region) -> Axes:
     """Draw the hull and every rollout: strong where it is inside, pale outside, with a dot at its start."""
     stride = max(1, region.rollouts.shape[1] // DRAWN_POINTS)
     rollouts, inside = region.rollouts[:, ::stride], region.inside[:, ::stride]
-    edge = {"edgecolor": COLOUR["euclidean"], "linewidth": 0.6}
-    ax.add_patch(Polygon(region.hull, facecolor=COLOUR["region"], label="demonstration region", zorder=0, **edge))
+    hull = Polygon(region.hull, facecolor=COLOUR["region"], label="demonstration region", zorder=0)
+    hull.set(edgecolor=COLOUR["euclidean"], linewidth=0.6)
+    ax.add_patch(hull)
     outside_line = _masked_polyline(rollouts, ~inside | _after(~inside))
     ax.plot(*outside_line, color=COLOUR["outside"], linewidth=0.6, label="outside", zorder=1)
     ax.plot(*_masked_polyline(rollouts, inside), color=COLOUR["grid"], linewidth=0.8, label="inside", zorder=2)
     ax.plot(*rollouts[:, 0].T, ".", color=COLOUR["grid"], markersize=3, label="start", zorder=2)
+    limit_to(ax, np.concatenate([region.hull, region.rollouts[:, 0]]))
     label_plane(ax)
     return ax
 
@@ -29,7 +31,7 @@ def draw_region(ax: Axes, region: Region) -> Axes:
 def draw_steps_inside(ax: Axes, region: Region) -> Axes:
     """Draw a histogram of the time steps that rollouts spend inside, with their mean."""
     steps, total = region.steps_inside, region.inside.shape[1]
-    ax.hist(steps, bins=np.linspace(0, total, 21), color=COLOUR["grid"], edgecolor="white", linewidth=0.5)
+    ax.hist(steps, bins=np.linspace(0, total, 21).tolist(), color=COLOUR["grid"], edgecolor="white", linewidth=0.5)
     mean = f"mean {steps.mean():.0f} ± {steps.std():.0f}"
     ax.axvline(steps.mean(), color="black", linestyle="--", linewidth=1, label=mean)
     ax.set(xlabel=f"time steps inside, of {total} [1]", ylabel=f"rollouts, of {len(steps)} [1]", xlim=(0, total))

@@ -14,7 +14,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from geomotion.files import atomic
 
@@ -88,6 +88,13 @@ def label_plane(ax: Axes) -> None:
         axis.set_major_locator(MaxNLocator(nbins=5))
 
 
+def limit_to(ax: Axes, points: NDArray[np.float64], margin: float = 0.08) -> None:
+    """Show a box around planar points of shape (n, 2), whatever else is drawn: diverging rollouts leave it."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = margin * (high - low)
+    ax.set(xlim=(low[0] - room[0], high[0] + room[0]), ylim=(low[1] - room[1], high[1] + room[1]))
+
+
 def percent(share: float) -> str:
     """A share as a percentage with one decimal, exact at the ends: 0 % and 100 % mean none and all."""
     if share in (0.0, 1.0):
@@ -115,5 +122,5 @@ def save_figure(figure: Figure, folder: Path, name: str, data: Mapping[str, Arra
             with atomic(folder / f"{name}{suffix}") as temporary:
                 figure.savefig(temporary, **options)
     with atomic(folder / f"{name}.npz") as temporary:
-        np.savez_compressed(temporary, **{key: np.asarray(values) for key, values in data.items()})
+        np.savez_compressed(temporary, **{key: np.asarray(values) for key, values in data.items()})  # type: ignore[arg-type]
     return [f"{name}{suffix}" for suffix in (".png", ".pdf", ".npz")]

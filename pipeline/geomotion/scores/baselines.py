@@ -32,7 +32,7 @@ def averaged_curve(curves: Sequence[Curve], times_s: Sequence[Float[np.ndarray, 
     for curve, time_s in zip(curves, times_s, strict=True):
         share = (time_s - time_s[0]) / (time_s[-1] - time_s[0])
         resampled.append(np.stack([np.interp(shares, share, axis) for axis in curve.T], axis=1))
-    return np.mean(resampled, axis=0)
+    return np.asarray(np.mean(resampled, axis=0))
 
 
 def nearest_neighbour_velocities(states: Curve, known_states: Curve, known_velocities: Curve) -> Curve:

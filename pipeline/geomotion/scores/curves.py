@@ -108,7 +108,7 @@ def start_error(curve: Curve, other: OtherCurve) -> float:
 
 
 def root_mean_square_error(curve: Curve, other: Curve) -> float:
-    """Root of the mean squared distance between rows of equal number: states at equal times [m], or velocities [m/s]."""
+    """Root of the mean squared distance between equal rows: states at equal times [m], or velocities [m/s]."""
     return float(np.sqrt(((curve - other) ** 2).sum(axis=1).mean()))
 
 

@@ -32,7 +32,8 @@ def symmetric_eigenvalues(jacobians: Jacobians) -> Eigenvalues:
     Source:
         Thesis Eq. (2.15), with the identity as metric.
     """
-    return torch.linalg.eigvalsh((jacobians + jacobians.mT) / 2)
+    eigenvalues: Tensor = torch.linalg.eigvalsh((jacobians + jacobians.mT) / 2)
+    return eigenvalues
 
 
 def eigenvalues_in_metric(field: Map, chart: Chart, x: States) -> Eigenvalues:
@@ -41,8 +42,8 @@ def eigenvalues_in_metric(field: Map, chart: Chart, x: States) -> Eigenvalues:
     .. math:: \tfrac12 (M J + J^\top M + \dot M)\, v = \lambda M v, \qquad M = D\psi^\top D\psi
 
     The result equals :func:`symmetric_eigenvalues` of the latent field's Jacobian where there is a latent field;
-    this form also serves fields that were changed in the robot's coordinates. It is slower: second derivatives
-    of the chart, one column at a time.
+    this form also serves fields that were changed in the robot's coordinates. It is slower, because it needs second
+    derivatives of the chart.
 
     Returns:
         Generalised eigenvalues, ascending [1/s for a field in units per second].
@@ -52,14 +53,15 @@ def eigenvalues_in_metric(field: Map, chart: Chart, x: States) -> Eigenvalues:
     """
     jacobians = field_jacobian(field, x)
     velocities = field(x).detach()
-    columns = [
-        jvp(lambda y, axis=axis: jvp(chart.to_latent, (y,), (axis.expand_as(y),))[1], (x,), (velocities,))
-        for axis in torch.eye(x.shape[1], dtype=x.dtype, device=x.device)
-    ]
-    chart_jacobian = torch.stack([value for value, _ in columns], dim=2)
-    chart_jacobian_rate = torch.stack([rate for _, rate in columns], dim=2)
+    chart_jacobian, chart_jacobian_rate = jvp(lambda y: _forward_jacobian(chart.to_latent, y), (x,), (velocities,))[:2]
     metric = chart_jacobian.mT @ chart_jacobian
     # sym(MJ) + Ṁ/2 is the symmetric part of MJ + Dψᵀ d/dt Dψ
     form = metric @ jacobians + chart_jacobian.mT @ chart_jacobian_rate
     inverse_root = torch.linalg.inv(torch.linalg.cholesky(metric))
     return symmetric_eigenvalues(inverse_root @ form @ inverse_root.mT).detach()
+
+
+def _forward_jacobian(function: Map, x: States) -> Jacobians:
+    """As :func:`field_jacobian`, by forward differentiation, which can be differentiated again."""
+    axes = torch.eye(x.shape[1], dtype=x.dtype, device=x.device)
+    return torch.stack([jvp(function, (x,), (axis.expand_as(x),))[1] for axis in axes], dim=2)

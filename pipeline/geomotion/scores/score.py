@@ -1,7 +1,6 @@
 """A score: a number with its unit, the number of values behind it and their spread."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -42,9 +41,7 @@ class Score:
         return document
 
 
-def summary_score(
-    value: float, values: ArrayLike | Sequence[float], unit: str, statistic: str, note: str = ""
-) -> Score:
+def summary_score(value: float, values: ArrayLike, unit: str, statistic: str, note: str = "") -> Score:
     """A named statistic of several values with their standard deviation; keeps up to 100 of the values."""
     array = np.asarray(values, dtype=float).ravel()
     kept = tuple(float(single) for single in array) if array.size <= VALUES_KEPT else ()
@@ -53,12 +50,12 @@ def summary_score(
     return Score(float(value), unit, int(array.size), spread, statistic, kept, note)
 
 
-def mean_score(values: ArrayLike | Sequence[float], unit: str, note: str = "") -> Score:
+def mean_score(values: ArrayLike, unit: str, note: str = "") -> Score:
     """Mean and standard deviation of several values."""
     return summary_score(float(np.mean(np.asarray(values, dtype=float))), values, unit, "mean", note)
 
 
-def max_score(values: ArrayLike | Sequence[float], unit: str, note: str = "") -> Score:
+def max_score(values: ArrayLike, unit: str, note: str = "") -> Score:
     """Largest of several values, with their standard deviation."""
     return summary_score(float(np.max(np.asarray(values, dtype=float))), values, unit, "max", note)
 

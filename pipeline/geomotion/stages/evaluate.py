@@ -1,26 +1,25 @@
 """Judge a trained field: scores, the arrays behind them, pictures, and the measured side of its certificate."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import torch
+from numpy.typing import NDArray
 
 from geomotion import models
 from geomotion.config import EvaluationConfig, Protocol, SolverConfig
 from geomotion.demos import storage
-from geomotion.demos.demonstrations import Demonstrations
-from geomotion.dynamics.fields import ChartedField
-from geomotion.dynamics.rollout import rollout
+from geomotion.demos.demonstrations import Demonstrations, Trajectory
 from geomotion.errors import InvalidSetting
 from geomotion.figures.evaluation import save_all
 from geomotion.files import atomic, read_json, write_json
 from geomotion.models import Skill
+from geomotion.scores.array_field import ArrayField
 from geomotion.scores.contraction import judge_contraction
 from geomotion.scores.evaluation import Evaluation, Unit, combine
 from geomotion.scores.goal import judge_goal
-from geomotion.scores.grids import bounding_box, sample_box
+from geomotion.scores.grids import Box, bounding_box, sample_box
 from geomotion.scores.nearby import judge_nearby, nearby_starts
 from geomotion.scores.reproduction import Judged, judge_reproduction
 from geomotion.scores.support import RegionProtocol, judge_region
@@ -53,17 +52,16 @@ def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: Stage
         InvalidSetting: If the peers' protocol is asked for on other data than theirs.
     """
     skill = models.load(inputs["train"].path("model.pt"))
-    certificate = read_json(inputs["train"].path("certificate.json"))
-    demonstrations = storage.load(inputs["ingest"].folder)
     if config.evaluation.protocol is Protocol.peers:
         require_peers_data(skill.train_demos, config.trim_start_points)
+    certificate = read_json(inputs["train"].path("certificate.json"))
+    demonstrations = storage.load(inputs["ingest"].folder)
 
     evaluation = compute(skill, demonstrations, certificate["rate_per_s"], config.evaluation, config.solver)
 
-    document = evaluation.document(config.evaluation.protocol.value, demonstrations.name)
-    write_json(run.folder / "scores.json", document)
+    write_json(run.folder / "scores.json", evaluation.document(config.evaluation.protocol.value, demonstrations.name))
     with atomic(run.folder / "evaluation.npz") as temporary:
-        np.savez_compressed(temporary, **evaluation.arrays)  # type: ignore[arg-type]
+        np.savez_compressed(temporary, allow_pickle=False, **evaluation.arrays)
     certificate["audit"] = audit(evaluation)
     write_json(run.folder / "certificate.json", certificate)
     run.log_scores(evaluation.scores)
@@ -71,10 +69,10 @@ def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: Stage
 
 
 def require_peers_data(train_demos: tuple[int, ...], trim_start_points: int) -> None:
-    """Check that numbers can stand beside those the peers publish.
+    """Check that scores can stand beside those that peers publish.
 
     Raises:
-        InvalidSetting: If demonstrations 0-4 were not trained on, or 15 points not trimmed.
+        InvalidSetting: If the model was not fitted to demonstrations 0-4, or 15 points were not trimmed.
     """
     if train_demos != PEERS_TRAIN_DEMOS or trim_start_points != PEERS_TRIM_POINTS:
         raise InvalidSetting(
@@ -101,43 +99,27 @@ def compute(
         settings: Protocol and grids.
         solver: How rollouts are computed.
     """
-    player = Player(skill.field, solver)
-    judged = [player.judge(demonstrations, skill.state_channels, number, True) for number in skill.train_demos]
-    if settings.protocol is Protocol.heldout:
-        judged += [player.judge(demonstrations, skill.state_channels, number, False) for number in skill.test_demos]
-    trained = [one for one in judged if one.is_trained]
-    tight = bounding_box([one.states for one in trained])
-    box = tight.enlarged(settings.grid_margin)
-    duration_s = float(np.mean([one.time_s[-1] for one in trained]))
-    grid = sample_box(box, settings.contraction_grid_points, settings.seed)
-    starts_per_axis = round(settings.region_starts**0.5)
-    region = RegionProtocol(
-        starts_per_axis,
-        settings.region_steps,
-        duration_s / float(np.mean([len(one.time_s) for one in trained])),
-        settings.region_margin * tight.diagonal,
+    field = ArrayField(
+        skill.field,
+        method=solver.method.value,
+        substeps=solver.substeps,
+        relative_tolerance=solver.relative_tolerance,
+        absolute_tolerance=solver.absolute_tolerance,
     )
-    nearby = nearby_starts(
-        trained[0].states[0], settings.nearby_starts, settings.nearby_spread * tight.diagonal, settings.seed
+    trained = [_judged(field, demonstrations[number], skill, True) for number in skill.train_demos]
+    numbers = skill.test_demos if settings.protocol is Protocol.heldout else ()
+    heldout = [_judged(field, demonstrations[number], skill, False) for number in numbers]
+    scene = Scene.around(trained, settings.grid_margin)
+    return combine(
+        [
+            judge_reproduction([*trained, *heldout], state_unit(skill.state_channels)),
+            _contraction(field, scene, settings),
+            _region(field, scene, settings),
+            _nearby(field, scene, settings, proven_rate),
+            _goal(field, scene, settings, skill.goal.double().numpy()),
+            _picture(field, scene),
+        ]
     )
-    parts = [
-        judge_reproduction(judged, state_unit(skill.state_channels)),
-        judge_contraction(skill.field, player.tensor(grid.points), grid.note),
-        Evaluation(arrays={"grid_points": grid.points, "grid_shape": np.array(grid.shape, dtype=int)}),
-        judge_region(player.roll, np.concatenate([one.states for one in trained]), box, region),
-        judge_nearby(player.roll, player.to_claimed, nearby, trained[0].time_s, proven_rate),
-        judge_goal(
-            player.roll,
-            skill.goal.double().numpy(),
-            sample_box(box, starts_per_axis, settings.seed),
-            np.linspace(0.0, settings.goal_duration * duration_s, settings.region_steps),
-            settings.goal_tolerance * tight.diagonal,
-        ),
-    ]
-    if box.dim == 2:
-        plane = sample_box(box, PICTURE_POINTS_PER_AXIS, settings.seed).points
-        parts.append(Evaluation(arrays={"field_points": plane, "field_velocity": player.velocity(plane)}))
-    return combine(parts)
 
 
 def audit(evaluation: Evaluation) -> dict[str, Any]:
@@ -146,63 +128,93 @@ def audit(evaluation: Evaluation) -> dict[str, Any]:
     return {name: score.as_dict()["value"] for name, score in evaluation.scores.items() if name.startswith(bearing)}
 
 
-def state_unit(channels: tuple[str, ...]) -> Unit:
-    """Millimetres for positions, radians for joints, and no common unit for mixtures."""
+def state_unit(channels: Sequence[str]) -> Unit:
+    """Millimetres for positions, radians for joints; mixtures have no common unit."""
     units = {"position_m": Unit("mm", 1000.0), "joints_rad": Unit("rad")}
     kinds = {units.get(channel, Unit("state unit")) for channel in channels}
     return kinds.pop() if len(kinds) == 1 else Unit("state unit")
 
 
-class Player:
-    """A field as functions of arrays, evaluated in the field's own precision.
+@dataclass(frozen=True)
+class Scene:
+    """What the training demonstrations say about where and for how long to judge a field.
 
-    Args:
-        field: The field.
-        solver: How rollouts are computed.
+    Attributes:
+        states: All their states [m].
+        start: Start of the first of them [m].
+        time_s: Its times after the start [s].
+        tight: Their bounding box.
+        box: The same with a margin.
+        duration_s: Their mean duration [s].
+        step_s: Mean duration over mean number of points [s].
     """
 
-    def __init__(self, field: ChartedField, solver: SolverConfig) -> None:
-        self.field = field
-        self.solver = solver
-        self.dtype = next(field.parameters()).dtype
+    states: NDArray[np.float64]
+    start: NDArray[np.float64]
+    time_s: NDArray[np.float64]
+    tight: Box
+    box: Box
+    duration_s: float
+    step_s: float
 
-    def tensor(self, values: np.ndarray) -> torch.Tensor:
-        """In the field's precision."""
-        return torch.as_tensor(values, dtype=self.dtype)
-
-    def roll(self, starts: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-        """Trajectories, shape (start, time, D) [m]."""
-        result = rollout(
-            self.field,
-            self.tensor(starts),
-            self.tensor(times_s),
-            method=self.solver.method.value,
-            substeps=self.solver.substeps,
-            relative_tolerance=self.solver.relative_tolerance,
-            absolute_tolerance=self.solver.absolute_tolerance,
+    @classmethod
+    def around(cls, trained: Sequence[Judged], margin: float) -> "Scene":
+        """The scene of these demonstrations."""
+        tight = bounding_box([one.states for one in trained])
+        duration_s = float(np.mean([one.time_s[-1] for one in trained]))
+        return cls(
+            np.concatenate([one.states for one in trained]),
+            trained[0].states[0],
+            trained[0].time_s,
+            tight,
+            tight.enlarged(margin),
+            duration_s,
+            duration_s / float(np.mean([len(one.time_s) for one in trained])),
         )
-        return result.states.double().numpy()
 
-    @torch.no_grad()
-    def velocity(self, states: np.ndarray) -> np.ndarray:
-        """ẋ at each state [m/s]."""
-        return self.field(self.tensor(states)).double().numpy()
 
-    @torch.no_grad()
-    def to_claimed(self, states: np.ndarray) -> np.ndarray:
-        """ψ at each state."""
-        return self.field.chart.to_latent(self.tensor(states)).double().numpy()
+def _judged(field: ArrayField, demonstration: Trajectory, skill: Skill, is_trained: bool) -> Judged:
+    states = demonstration.state(skill.state_channels)
+    time_s = demonstration.time_s - demonstration.time_s[0]
+    velocities = demonstration.velocity(skill.state_channels)
+    return Judged(time_s, states, velocities, field.roll(states[:1], time_s)[0], field.velocity(states), is_trained)
 
-    def judge(self, demonstrations: Demonstrations, channels: tuple[str, ...], number: int, is_trained: bool) -> Judged:
-        """One demonstration beside the rollout from its start."""
-        demonstration = demonstrations[number]
-        states = demonstration.state(channels)
-        time_s = demonstration.time_s - demonstration.time_s[0]
-        return Judged(
-            time_s,
-            states,
-            demonstration.velocity(channels),
-            self.roll(states[:1], time_s)[0],
-            self.velocity(states),
-            is_trained,
-        )
+
+def _contraction(field: ArrayField, scene: Scene, settings: EvaluationConfig) -> Evaluation:
+    grid = sample_box(scene.box, settings.contraction_grid_points, settings.seed)
+    measured = judge_contraction(field.field, field.tensor(grid.points), grid.note)
+    place = {"grid_points": grid.points, "grid_shape": np.array(grid.shape, dtype=int)}
+    return combine([Evaluation(arrays=place), measured])
+
+
+def _region(field: ArrayField, scene: Scene, settings: EvaluationConfig) -> Evaluation:
+    protocol = RegionProtocol(
+        _starts_per_axis(settings),
+        settings.region_steps,
+        scene.step_s,
+        settings.region_margin * scene.tight.diagonal,
+    )
+    return judge_region(field.roll, scene.states, scene.box, protocol)
+
+
+def _nearby(field: ArrayField, scene: Scene, settings: EvaluationConfig, proven_rate: float | None) -> Evaluation:
+    deviation = settings.nearby_spread * scene.tight.diagonal
+    starts = nearby_starts(scene.start, settings.nearby_starts, deviation, settings.seed)
+    return judge_nearby(field.roll, field.to_claimed, starts, scene.time_s, proven_rate)
+
+
+def _goal(field: ArrayField, scene: Scene, settings: EvaluationConfig, goal: NDArray[np.float64]) -> Evaluation:
+    starts = sample_box(scene.box, _starts_per_axis(settings), settings.seed)
+    times_s = np.linspace(0.0, settings.goal_duration * scene.duration_s, settings.region_steps)
+    return judge_goal(field.roll, goal, starts, times_s, settings.goal_tolerance * scene.tight.diagonal)
+
+
+def _picture(field: ArrayField, scene: Scene) -> Evaluation:
+    if scene.box.dim != 2:
+        return Evaluation()
+    points = sample_box(scene.box, PICTURE_POINTS_PER_AXIS, seed=0).points
+    return Evaluation(arrays={"field_points": points, "field_velocity": field.velocity(points)})
+
+
+def _starts_per_axis(settings: EvaluationConfig) -> int:
+    return max(2, round(settings.region_starts**0.5))

@@ -1,0 +1,1 @@
+"""Generators: demonstrations made by formula, labelled as such."""

@@ -1,0 +1,215 @@
+"""Preprocessing as explicit steps in a fixed order; every step that changes something is recorded with the data.
+
+Order: trim, clock from zero, quaternion signs, resample, smooth, align end points, scale, velocities.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from geomotion.config import PreprocessConfig, VelocitySource
+from geomotion.demos.demonstrations import VELOCITY_OF, Array, Demonstrations, Trajectory
+from geomotion.errors import InvalidSetting
+
+QUATERNION = "orientation_wxyz"
+LENGTHS = ("position_m", "velocity_m_per_s")
+EVEN_STEPS_TOLERANCE = 1e-3  # relative
+SMOOTHING_ORDER = 3
+
+
+def preprocess(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
+    """Apply the steps of `config`.
+
+    Recorded velocities do not survive resampling and smoothing: they are then estimated from the new positions, and
+    the recorded steps say so.
+
+    Raises:
+        InvalidSetting: If a step does not fit the recordings.
+    """
+    _check_recorded_velocities(demonstrations, config)
+    demonstrations = _trim(demonstrations, config)
+    demonstrations = _start_clocks_at_zero(demonstrations)
+    demonstrations = _make_quaternions_continuous(demonstrations)
+    demonstrations = _resample(demonstrations, config)
+    demonstrations = _smooth(demonstrations, config)
+    demonstrations = _align_ends(demonstrations, config)
+    demonstrations = _scale(demonstrations, config)
+    return _provide_velocities(demonstrations, config)
+
+
+def estimate_velocity(time_s: Array, values: Array) -> Array:
+    """Differentiate samples at any increasing times, to second order also at both ends, shape (time, axes) [1/s]."""
+    return np.asarray(np.gradient(values, time_s, axis=0, edge_order=min(2, len(time_s) - 1)), dtype=np.float64)
+
+
+def _trim(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
+    first, last = config.trim_start_points, config.trim_end_points
+    if not first and not last:
+        return demonstrations
+    shortest = min(len(trajectory) for trajectory in demonstrations.trajectories)
+    if shortest - first - last < 2:
+        key = "trim_start_points" if first >= last else "trim_end_points"
+        expected = f"at least two points left of the shortest demonstration, which has {shortest}"
+        raise InvalidSetting(f"dataset.preprocess.{key}", max(first, last), expected)
+
+    def trim(trajectory: Trajectory) -> Trajectory:
+        kept = slice(first, len(trajectory) - last)
+        channels = {name: values[kept] for name, values in trajectory.channels.items()}
+        return replace(trajectory, time_s=trajectory.time_s[kept], channels=channels)
+
+    return _map(demonstrations, trim, f"trimmed {first} points at the start and {last} at the end")
+
+
+def _start_clocks_at_zero(demonstrations: Demonstrations) -> Demonstrations:
+    if all(trajectory.time_s[0] == 0 for trajectory in demonstrations.trajectories):
+        return demonstrations
+    return _map(
+        demonstrations,
+        lambda trajectory: replace(trajectory, time_s=trajectory.time_s - trajectory.time_s[0]),
+        "shifted the time of every demonstration to start at 0 s",
+    )
+
+
+def _make_quaternions_continuous(demonstrations: Demonstrations) -> Demonstrations:
+    """Choose between q and -q: near the previous sample, and at the start near the first demonstration."""
+    if QUATERNION not in demonstrations.channel_names:
+        return demonstrations
+    reference = demonstrations[0].channels[QUATERNION][0]
+
+    def flip(trajectory: Trajectory) -> Trajectory:
+        q = trajectory.channels[QUATERNION]
+        turns = np.einsum("ti,ti->t", q, np.concatenate([reference[None], q[:-1]]))
+        signs = np.cumprod(np.where(turns < 0, -1.0, 1.0))
+        return _with_channels(trajectory, {QUATERNION: q * signs[:, None]})
+
+    flipped = [flip(trajectory) for trajectory in demonstrations.trajectories]
+    pairs = zip(demonstrations.trajectories, flipped, strict=True)
+    if all(np.array_equal(old.channels[QUATERNION], new.channels[QUATERNION]) for old, new in pairs):
+        return demonstrations
+    return demonstrations.with_step(flipped, "chose quaternion signs continuous in time and alike across demonstrations")
+
+
+def _resample(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
+    points = config.resample_points
+    if points is None:
+        return demonstrations
+    from scipy.interpolate import CubicSpline
+
+    def resample(trajectory: Trajectory) -> Trajectory:
+        time_s = np.linspace(trajectory.time_s[0], trajectory.time_s[-1], points)
+        channels = {
+            name: CubicSpline(trajectory.time_s, values)(time_s) for name, values in _without_velocities(trajectory)
+        }
+        return replace(trajectory, time_s=time_s, channels=_normalise_quaternions(channels))
+
+    return _map(demonstrations, resample, f"resampled to {points} points, even in time (cubic spline)")
+
+
+def _smooth(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
+    if config.smooth_window_s == 0:
+        return demonstrations
+    from scipy.signal import savgol_filter
+
+    def smooth(trajectory: Trajectory) -> Trajectory:
+        points = _window_points(trajectory, config.smooth_window_s)
+        channels = {
+            name: savgol_filter(values, points, SMOOTHING_ORDER, axis=0) for name, values in _without_velocities(trajectory)
+        }
+        return replace(trajectory, channels=_normalise_quaternions(channels))
+
+    return _map(
+        demonstrations, smooth, f"smoothed over {config.smooth_window_s:g} s (Savitzky-Golay, order {SMOOTHING_ORDER})"
+    )
+
+
+def _window_points(trajectory: Trajectory, window_s: float) -> int:
+    """Odd number of samples in the window.
+
+    Raises:
+        InvalidSetting: If times are uneven, or the window is not wider than the polynomial needs, or too wide.
+    """
+    key = "dataset.preprocess.smooth_window_s"
+    steps = np.diff(trajectory.time_s)
+    mean = float(steps.mean())
+    if np.ptp(steps) > EVEN_STEPS_TOLERANCE * mean:
+        raise InvalidSetting(key, window_s, "times even in every demonstration; set dataset.preprocess.resample_points=")
+    points = 2 * round(window_s / mean / 2) + 1
+    narrowest = SMOOTHING_ORDER + 2
+    if not narrowest <= points <= len(trajectory):
+        expected = f"0, or a window of {(narrowest - 1) * mean:.3g} s to {trajectory.duration_s:.3g} s"
+        raise InvalidSetting(key, window_s, expected)
+    return points
+
+
+def _align_ends(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
+    if not config.align_end:
+        return demonstrations
+    names = [name for name in demonstrations.channel_names if name in VELOCITY_OF]
+    ends = {
+        name: np.mean([trajectory.channels[name][-1] for trajectory in demonstrations.trajectories], axis=0) for name in names
+    }
+
+    def align(trajectory: Trajectory) -> Trajectory:
+        return _with_channels(
+            trajectory, {name: trajectory.channels[name] + (ends[name] - trajectory.channels[name][-1]) for name in names}
+        )
+
+    return _map(demonstrations, align, f"shifted {', '.join(names)} of every demonstration to end at their mean end point")
+
+
+def _scale(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
+    names = [name for name in demonstrations.channel_names if name in LENGTHS]
+    if config.scale == 1 or not names:
+        return demonstrations
+    return _map(
+        demonstrations,
+        lambda trajectory: _with_channels(trajectory, {name: config.scale * trajectory.channels[name] for name in names}),
+        f"scaled lengths by {config.scale:g}",
+    )
+
+
+def _velocity_channels(demonstrations: Demonstrations) -> dict[str, str]:
+    return {name: VELOCITY_OF[name] for name in demonstrations.channel_names if name in VELOCITY_OF}
+
+
+def _check_recorded_velocities(demonstrations: Demonstrations, config: PreprocessConfig) -> None:
+    missing = set(_velocity_channels(demonstrations).values()) - set(demonstrations.channel_names)
+    if config.velocity is VelocitySource.recorded and missing:
+        expected = f"estimated, because {demonstrations.name} records no {', '.join(sorted(missing))}"
+        raise InvalidSetting("dataset.preprocess.velocity", config.velocity.value, expected)
+
+
+def _provide_velocities(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
+    wanted = _velocity_channels(demonstrations)
+    survived = set(wanted.values()) <= set(demonstrations.channel_names)
+    if config.velocity is VelocitySource.recorded and survived:
+        return demonstrations
+
+    def estimate(trajectory: Trajectory) -> Trajectory:
+        return _with_channels(
+            trajectory,
+            {velocity: estimate_velocity(trajectory.time_s, trajectory.channels[name]) for name, velocity in wanted.items()},
+        )
+
+    return _map(demonstrations, estimate, "estimated velocities by second-order differences")
+
+
+def _map(demonstrations: Demonstrations, function: Callable[[Trajectory], Trajectory], step: str) -> Demonstrations:
+    return demonstrations.with_step([function(trajectory) for trajectory in demonstrations.trajectories], step)
+
+
+def _with_channels(trajectory: Trajectory, channels: dict[str, Array]) -> Trajectory:
+    return replace(trajectory, channels={**trajectory.channels, **channels})
+
+
+def _without_velocities(trajectory: Trajectory) -> list[tuple[str, Array]]:
+    return [(name, values) for name, values in trajectory.channels.items() if name not in VELOCITY_OF.values()]
+
+
+def _normalise_quaternions(channels: dict[str, Array]) -> dict[str, Array]:
+    """Bring interpolated or averaged quaternions back to unit length."""
+    if QUATERNION not in channels:
+        return channels
+    q = channels[QUATERNION]
+    return {**channels, QUATERNION: q / np.linalg.norm(q, axis=1, keepdims=True)}

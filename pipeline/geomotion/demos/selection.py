@@ -1,0 +1,49 @@
+"""Which demonstrations and channels an experiment uses."""
+
+from collections.abc import Sequence
+
+from geomotion.config import DatasetConfig
+from geomotion.demos.demonstrations import VELOCITY_OF, Demonstrations
+from geomotion.errors import InvalidSetting, UnknownName
+
+HELD_OUT = 2  # by default, where at least two remain to train on
+
+
+def split(config: DatasetConfig, demonstrations: Demonstrations) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Numbers of the demonstrations to train on and of those held out.
+
+    Raises:
+        InvalidSetting: If a number does not exist, is given twice, is on both sides, or nothing is left to train on.
+    """
+    count = len(demonstrations)
+    held_out = HELD_OUT if count >= 2 * HELD_OUT else 0
+    train = range(count - held_out) if config.train_demos is None else config.train_demos
+    _check("dataset.train_demos", train, count)
+    if not train:
+        raise InvalidSetting("dataset.train_demos", [], f"at least one of the demonstrations 0 to {count - 1}")
+    test = [demo for demo in range(count) if demo not in train] if config.test_demos is None else config.test_demos
+    _check("dataset.test_demos", test, count)
+    if shared := sorted(set(train) & set(test)):
+        raise InvalidSetting("dataset.test_demos", list(test), f"none of dataset.train_demos, which also has {shared}")
+    return tuple(train), tuple(test)
+
+
+def check_state_channels(config: DatasetConfig, demonstrations: Demonstrations) -> None:
+    """Check that a field can be learned on the chosen channels.
+
+    Raises:
+        UnknownName: If the recordings have no such channel.
+        InvalidSetting: If no channel is chosen, or one whose time derivative is no velocity channel.
+    """
+    if not config.state_channels:
+        raise InvalidSetting("dataset.state_channels", [], f"some of {list(demonstrations.channel_names)}")
+    for name in config.state_channels:
+        if name not in demonstrations.channel_names:
+            raise UnknownName(f"channel of {demonstrations.name}", name, demonstrations.channel_names)
+        if name not in VELOCITY_OF:
+            raise InvalidSetting("dataset.state_channels", name, f"channels with a velocity: {', '.join(VELOCITY_OF)}")
+
+
+def _check(key: str, demos: Sequence[int], count: int) -> None:
+    if any(not 0 <= demo < count for demo in demos) or len(set(demos)) < len(demos):
+        raise InvalidSetting(key, list(demos), f"different numbers from 0 to {count - 1}")

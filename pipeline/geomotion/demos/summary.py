@@ -1,0 +1,88 @@
+"""What a dataset holds: numbers for machines, and a table for people."""
+
+from typing import Any
+
+import numpy as np
+
+from geomotion.config import DatasetConfig
+from geomotion.demos.demonstrations import CHANNEL_UNITS, Demonstrations, Trajectory
+from geomotion.demos.selection import split
+
+
+def summarise(demonstrations: Demonstrations, config: DatasetConfig) -> dict[str, Any]:
+    """Summary as JSON types; lengths and speeds are those of the first state channel, in its unit."""
+    train, test = split(config, demonstrations)
+    channel = config.state_channels[0]
+    sets = {**dict.fromkeys(train, "train"), **dict.fromkeys(test, "test")}
+    demos = [
+        {"demo": number, "label": trajectory.label, "set": sets.get(number, "unused"), **_numbers(trajectory, channel)}
+        for number, trajectory in enumerate(demonstrations.trajectories)
+    ]
+    return {
+        "name": demonstrations.name,
+        "space": demonstrations.space,
+        "frame": demonstrations.frame,
+        "source": demonstrations.source,
+        "licence": demonstrations.licence,
+        "steps": list(demonstrations.steps),
+        "channels": {name: values.shape[1] for name, values in demonstrations[0].channels.items()},
+        "summary_channel": channel,
+        "unit": CHANNEL_UNITS[channel],
+        "total": {
+            "demos": len(demos),
+            "points": sum(demo["points"] for demo in demos),
+            "duration_s": sum(demo["duration_s"] for demo in demos),
+        },
+        "demos": demos,
+    }
+
+
+def _numbers(trajectory: Trajectory, channel: str) -> dict[str, Any]:
+    values = trajectory.channels[channel]
+    length = float(np.linalg.norm(np.diff(values, axis=0), axis=1).sum())
+    return {
+        "points": len(trajectory),
+        "duration_s": trajectory.duration_s,
+        "path_length": length,
+        "mean_speed": length / trajectory.duration_s,
+        "start": values[0].tolist(),
+        "end": values[-1].tolist(),
+    }
+
+
+def summary_table(summary: dict[str, Any]) -> str:
+    """The summary as lines of plain text."""
+    unit, total = summary["unit"], summary["total"]
+    heads = ["demo", "set", "points", "duration [s]", f"length [{unit}]", f"speed [{unit}/s]", f"start [{unit}]", f"end [{unit}]"]
+    rows = [
+        [
+            str(demo["demo"]), demo["set"], str(demo["points"]), f"{demo['duration_s']:.3f}", f"{demo['path_length']:.4f}",
+            f"{demo['mean_speed']:.4f}", _vector(demo["start"]), _vector(demo["end"]),
+        ]
+        for demo in summary["demos"]
+    ]  # fmt: skip
+    if any(demo["label"] for demo in summary["demos"]):
+        heads.append("label")
+        rows = [[*row, demo["label"]] for row, demo in zip(rows, summary["demos"], strict=True)]
+    channels = ", ".join(f"{name} ({width})" for name, width in summary["channels"].items())
+    return "\n".join(
+        [
+            f"{summary['name']}: {total['demos']} demonstrations, {total['points']} points, {total['duration_s']:.2f} s",
+            f"space     {summary['space']}, frame: {summary['frame']}",
+            f"channels  {channels}",
+            f"source    {summary['source']}",
+            f"licence   {summary['licence'] or 'not stated'}",
+            *(f"step {number}    {step}" for number, step in enumerate(summary["steps"], start=1)),
+            "",
+            *_aligned([heads, *rows]),
+        ]
+    )
+
+
+def _vector(values: list[float]) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.3f}" for value in values) + ")"
+
+
+def _aligned(rows: list[list[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -1,0 +1,35 @@
+"""Stage ``ingest``: recordings in, preprocessed demonstrations out, with a summary and a picture."""
+
+from collections.abc import Mapping
+
+from geomotion.config import DatasetConfig
+from geomotion.demos import readers, storage
+from geomotion.demos.preprocessing import preprocess
+from geomotion.demos.selection import check_state_channels, split
+from geomotion.demos.summary import summarise, summary_table
+from geomotion.figures.demonstrations import figure_data, figure_demonstrations
+from geomotion.figures.style import save_figure
+from geomotion.files import write_json
+from geomotion.tracking import Artefacts, StageRun
+
+__all__ = ["ingest", "summary_table"]
+
+
+def ingest(config: DatasetConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
+    """Read and preprocess the demonstrations that `config` names.
+
+    Writes the dataset in the layout of :mod:`geomotion.demos.storage`, ``summary.json`` (what
+    :func:`summary_table` prints) and ``figures/demonstrations``.
+
+    Raises:
+        MissingData: If the recordings are not there.
+        DatasetError: If they break a rule.
+        InvalidSetting: If the configuration does not fit them.
+    """
+    demonstrations = preprocess(readers.read(config), config.preprocess)
+    check_state_channels(config, demonstrations)
+    _, held_out = split(config, demonstrations)
+    storage.save(demonstrations, run.folder)
+    write_json(run.folder / "summary.json", summarise(demonstrations, config))
+    figure = figure_demonstrations(demonstrations, held_out=held_out)
+    save_figure(figure, run.folder / "figures", "demonstrations", figure_data(demonstrations))
