@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import cycle
+from pathlib import Path
 
 import torch
 from torch import Tensor, nn
@@ -152,7 +153,12 @@ def fields(model: str | None) -> Iterator[tuple[str, LineIntegralField]]:
     if model is not None:
         from geomotion.models import load
 
-        yield model, load(model).field.field
+        field = load(Path(model)).field.field
+        if not isinstance(field, LineIntegralField):
+            raise SystemExit(
+                f"{model}: expected a model trained with field=line_integral, found {type(field).__name__}"
+            )
+        yield model, field
 
 
 def main() -> None:

@@ -8,13 +8,14 @@ import json
 import os
 import sys
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import hydra
 from hydra._internal.utils import get_args_parser
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -86,10 +87,13 @@ def _check_flags(arguments: list[str]) -> None:
 
 
 def _run_job(verb: str, config: DictConfig, reporter: Reporter, run_verb: RunVerb | None) -> float | None:
+    overrides = list(HydraConfig.get().overrides.task)
+    if HydraConfig.get().mode is RunMode.MULTIRUN:
+        reporter = replace(reporter, command=f"{reporter.command} {' '.join(overrides)}")
     try:
         settings = _typed(config)
         with output_to_stderr():
-            result = (run_verb or _pipeline())(verb, settings, list(HydraConfig.get().overrides.task))
+            result = (run_verb or _pipeline())(verb, settings, overrides)
         text = _as_text(result, settings.output)
     except Interrupted as error:
         raise SystemExit(reporter.report(pipeline_error(error), error)) from None  # ends a sweep, too

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import fields
 
 from hydra import initialize_config_module
-from hydra.core.config_loader import ConfigLoader
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.object_type import ObjectType
+from hydra.plugins.config_source import ConfigSource
 
 from geomotion.config import GmsConfig, NcdsConfig
 
@@ -22,18 +22,15 @@ def top_level_names(config_type: type[GmsConfig]) -> list[str]:
 def group_options(*groups: str) -> dict[str, list[str]]:
     """Every option of each group, as it is written after ``group=``; a group without options is left out."""
     with initialize_config_module(version_base="1.3", config_module="geomotion.conf"):
-        loader = GlobalHydra.instance().config_loader()
-        options = {group: sorted(_options_below(loader, group)) for group in groups}
+        sources = GlobalHydra.instance().config_loader().get_sources()
+    options = {group: sorted(set(_options_below(sources, group))) for group in groups}
     return {group: found for group, found in options.items() if found}
 
 
-def _options_below(loader: ConfigLoader, group: str, prefix: str = "") -> Iterator[str]:
-    for name in _names(loader, group, ObjectType.CONFIG):
-        if not name.endswith(_INTERNAL_SUFFIX):
-            yield prefix + name
-    for name in _names(loader, group, ObjectType.GROUP):
-        yield from _options_below(loader, f"{group}/{name}", f"{prefix}{name}/")
-
-
-def _names(loader: ConfigLoader, group: str, kind: ObjectType) -> list[str]:
-    return loader.get_group_options(group, results_filter=kind, config_name=None, overrides=[])
+def _options_below(sources: list[ConfigSource], group: str, prefix: str = "") -> Iterator[str]:
+    for source in (source for source in sources if source.is_group(group)):
+        for name in source.list(group, results_filter=ObjectType.CONFIG):
+            if not name.endswith(_INTERNAL_SUFFIX):
+                yield prefix + name
+        for name in source.list(group, results_filter=ObjectType.GROUP):
+            yield from _options_below([source], f"{group}/{name}", f"{prefix}{name}/")

@@ -62,7 +62,7 @@ def pipeline_error(error: Exception) -> Failure:
     )
 
 
-def did_you_mean(name: str, options: list[str]) -> str:
-    """`` Did you mean …?`` with the closest of `options`, or nothing."""
+def did_you_mean(name: str, options: list[str], prefix: str = "") -> str:
+    """`` Did you mean …?`` with the closest of `options`, shown behind `prefix`, or nothing."""
     close = get_close_matches(name, options, n=1, cutoff=0.5)
-    return f" Did you mean {close[0]!r}?" if close else ""
+    return f" Did you mean {prefix + close[0]!r}?" if close else ""

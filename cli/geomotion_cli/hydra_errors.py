@@ -20,7 +20,8 @@ def retell(error: Exception) -> str:
         case MissingConfigException(missing_cfg_file=str(path)) if "/" in path:
             return _unknown_option(path, error)
         case OverrideParseException():
-            return f"cannot read {error.override!r}: {_first_sentence(error)}; settings are written key=value."
+            reason = _first_sentence(error).split("; ")[-1]
+            return f"cannot read {error.override!r}: {reason}; settings are written key=value."
         case MissingMandatoryValue():
             return f"{error.full_key} has no value; set it with {error.full_key}=…"
         case HydraException(__cause__=OmegaConfBaseException() as cause):
@@ -33,9 +34,12 @@ def retell(error: Exception) -> str:
 def unknown_setting(key: str, config: DictConfig) -> str:
     """One line about a key that the configuration does not have, with the nearest one that it has."""
     parent, _, name = key.rpartition(".")
-    namesakes = [other for other in _all_settings(config) if other.endswith(f".{name}")]
     siblings = _settings_in(config, parent)
-    guess = f" Did you mean {namesakes[0]!r}?" if namesakes else did_you_mean(key, siblings)
+    namesakes = [other for other in _all_settings(config) if other.endswith(f".{key}")]
+    if namesakes:
+        guess = f" Did you mean {namesakes[0]!r}?"
+    else:
+        guess = did_you_mean(name, siblings, prefix=f"{parent}." if parent else "")
     place = f" in {parent}" if parent else ""
     return f"unknown setting {key!r}.{guess} Available{place}: {', '.join(siblings) or 'none'}."
 
@@ -66,15 +70,16 @@ def _first_sentence(error: Exception) -> str:
 
 
 def _settings_in(config: DictConfig, parent: str = "") -> list[str]:
-    """Full keys of what is declared directly below `parent`."""
+    """Names declared directly below `parent`."""
     node = OmegaConf.select(config, parent, throw_on_resolution_failure=False) if parent else config
     kind = OmegaConf.get_type(node) if OmegaConf.is_dict(node) else None
     if not parent and kind is not None and issubclass(kind, GmsConfig):
         return top_level_names(kind)
-    return [f"{parent}.{item.name}" for item in fields(kind)] if is_dataclass(kind) else []
+    return [item.name for item in fields(kind)] if is_dataclass(kind) else []
 
 
 def _all_settings(config: DictConfig, parent: str = "") -> Iterator[str]:
-    for key in _settings_in(config, parent):
+    for name in _settings_in(config, parent):
+        key = f"{parent}.{name}" if parent else name
         yield key
         yield from _all_settings(config, key)

@@ -35,7 +35,7 @@ _TRAINING = {
 }
 _RUN = {"run=latest": "the trained run: latest, an MLflow run id, or a path"}
 _STORE = {"tracking.root=runs": "folder of the MLflow store, artefacts and checkpoints"}
-_JSON = {"output=json": "one JSON document on standard output, everything else on standard error"}
+_JSON = {"output=json": "one JSON document (a sweep: one line per job) on standard output, all else on standard error"}
 
 _INGEST = Verb(
     "read, check and preprocess recordings; print a table and draw them",

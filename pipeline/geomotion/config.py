@@ -175,15 +175,18 @@ class IdentityChart(ChartConfig):
 
 @dataclass
 class FlowChart(ChartConfig):
-    """Invertible flow of affine couplings with random-feature conditioners."""
+    """Invertible flow of affine couplings, conditioned on Fourier features."""
 
     layers: int = 10
-    features: int = 200
-    length_scale: float = 0.45  # of the scaled data, which fill [-1, 1]
+    features: int = 64  # of each layer, per coordinate that it keeps
+    length_scales: list[float] = default(default_factory=lambda: [0.25, 0.5, 1.0])  # of the scaled data, which fill [-1, 1]
     log_scale_cap: float = 1.5
 
     def __post_init__(self) -> None:
-        _require_positive("chart", self, "layers", "features", "length_scale", "log_scale_cap")
+        _require_positive("chart", self, "layers", "features", "log_scale_cap")
+        _require(self.features % 2 == 0, "chart.features", self.features, "an even number: cosine and sine of each angle")
+        scales = self.length_scales
+        _require(len(scales) > 0 and min(scales) > 0, "chart.length_scales", scales, "one or more positive lengths")
 
 
 @dataclass
@@ -193,10 +196,10 @@ class FieldConfig:
 
 @dataclass
 class LinearField(FieldConfig):
-    """ż = A (z - z*), sym A ≼ -rate I: contracting by construction."""
+    """ż = A z, sym A ≼ -rate I: contracting by construction."""
 
-    min_rate_per_duration: float = 0.5  # certified rate, in units of 1 / mean demonstration duration
-    initial_rate_per_duration: float = 3.0
+    min_rate_per_duration: float = 0.1  # certified rate, in units of 1 / mean demonstration duration
+    initial_rate_per_duration: float = 2.0
 
     def __post_init__(self) -> None:
         _require_positive("field", self, "min_rate_per_duration")
@@ -300,25 +303,45 @@ class StateIndependentRegulariser(RegulariserConfig):
 class TrainingConfig:
     """Shared by all objectives."""
 
-    steps: int = 1000
-    learning_rate: float = 5e-3
+    steps: int = 4000
+    learning_rate: float = 1e-2  # at its highest; falls to zero along a cosine
+    ramp_steps: int = 50  # over which the learning rate rises
     gradient_clip: float = 1.0
-    checkpoint_every_steps: int = 100
+    checkpoint_every_steps: int = 500
     log_every_steps: int = 20
 
     def __post_init__(self) -> None:
         _require_positive(
-            "training", self, "steps", "learning_rate", "gradient_clip", "checkpoint_every_steps", "log_every_steps"
-        )
+            "training", self, "steps", "learning_rate", "ramp_steps", "gradient_clip", "checkpoint_every_steps",
+            "log_every_steps",
+        )  # fmt: skip
 
 
 @dataclass
 class TrajectoryTraining(TrainingConfig):
-    """Whole trajectories in closed form: distance at equal times, nearest points, velocities."""
+    """Whole trajectories in closed form; distances in units of the scaled data, times in mean durations."""
 
-    equal_time_weight: float = 20.0
-    nearest_point_weight: float = 5.0
-    velocity_weight: float = 0.02
+    steps: int = 8000
+    warm_up: float = 0.4  # share of the steps before the nearest-point term
+    equal_time_warm_up_weight: float = 20.0
+    equal_time_weight: float = 1.0  # after the warm-up
+    nearest_point_weight: float = 5.0  # squared distance between whole curves
+    nearest_point_mean_weight: float = 0.5  # distance between whole curves
+    velocity_weight: float = 0.1
+    mixing: float = 0.0  # demonstrations are mixed in pairs by up to this share
+    starts: int = 4  # of each demonstration in each step
+    times: int = 32  # of each start
+    curve_points: int = 64
+    curve_stride: int = 8  # every eighth point of a demonstration takes part in the nearest-point term
+    velocity_points: int = 256
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("training", self, "times", "curve_stride", "velocity_points")
+        _require(self.starts >= 2, "training.starts", self.starts, "2 or more")
+        _require(self.curve_points >= 2, "training.curve_points", self.curve_points, "2 or more")
+        for name in ("warm_up", "mixing"):
+            _require(0 <= getattr(self, name) <= 1, f"training.{name}", getattr(self, name), "a share between 0 and 1")
 
 
 @dataclass

@@ -11,9 +11,10 @@ from torch import nn
 from geomotion import config as schema
 from geomotion.dynamics.charts import AnchoredChart, ComposedChart, IdentityChart, ScalingChart
 from geomotion.dynamics.fields import Chart, ChartedField, VectorField
-from geomotion.dynamics.line_integral import LineIntegralField
+from geomotion.dynamics.line_integral import DormandPrince, LineIntegralField, LineIntegrator, RungeKutta4
 from geomotion.dynamics.linear import LinearField
-from geomotion.dynamics.regularisers import ConstantRegulariser, StateIndependentRegulariser
+from geomotion.dynamics.quadrature import GaussLegendre
+from geomotion.dynamics.regularisers import ConstantRegulariser, Regulariser, StateIndependentRegulariser
 from geomotion.errors import CorruptArtefact, InvalidSetting
 from geomotion.files import atomic
 from geomotion.networks.coupling import CouplingFlow
@@ -97,7 +98,7 @@ def _chart(config: schema.ChartConfig, dim: int) -> Chart:
         case schema.FlowChart():
             if dim < 2:
                 raise InvalidSetting("chart", "flow", "at least two coordinates; use chart=identity in one dimension")
-            return CouplingFlow(dim, config.layers, config.features, config.length_scale, config.log_scale_cap)
+            return CouplingFlow(dim, config.layers, config.features, config.length_scales, config.log_scale_cap)
         case unknown:
             raise TypeError(f"no builder for {type(unknown).__name__}")
 
@@ -105,24 +106,30 @@ def _chart(config: schema.ChartConfig, dim: int) -> Chart:
 def _line_integral(
     config: schema.LineIntegralField, regulariser: schema.RegulariserConfig, chart: Chart, geometry: Geometry
 ) -> LineIntegralField:
-    dim = chart.dim
     base = torch.tensor(geometry.goal if config.base_point is schema.BasePoint.target else geometry.mean)
     with torch.no_grad():
         base_point = chart.to_latent(base)
+    base_velocity = torch.zeros_like(base_point)
     return LineIntegralField(
-        JacobianRoot(dim, tuple(config.hidden_units), config.activation.value),
-        _regulariser(regulariser, dim),
-        base_point,
-        learn_base_point=config.base_point is schema.BasePoint.learned,
-        learn_base_velocity=config.base_velocity is schema.BaseVelocity.learned,
-        integrator=config.integrator.value,
-        nodes=config.nodes,
-        relative_tolerance=config.relative_tolerance,
-        absolute_tolerance=config.absolute_tolerance,
+        JacobianRoot(chart.dim, config.hidden_units, config.activation.value),
+        _regulariser(regulariser, chart.dim),
+        nn.Parameter(base_point) if config.base_point is schema.BasePoint.learned else base_point,
+        nn.Parameter(base_velocity) if config.base_velocity is schema.BaseVelocity.learned else base_velocity,
+        _integrator(config),
     )
 
 
-def _regulariser(config: schema.RegulariserConfig, dim: int) -> nn.Module:
+def _integrator(config: schema.LineIntegralField) -> LineIntegrator:
+    match config.integrator:
+        case schema.Integrator.quadrature:
+            return GaussLegendre(config.nodes)
+        case schema.Integrator.rk4:
+            return RungeKutta4(config.nodes)
+        case schema.Integrator.dopri5:
+            return DormandPrince(config.relative_tolerance, config.absolute_tolerance)
+
+
+def _regulariser(config: schema.RegulariserConfig, dim: int) -> Regulariser:
     match config:
         case schema.ConstantRegulariser():
             return ConstantRegulariser(config.epsilon, dim)

@@ -10,10 +10,10 @@ from geomotion.networks.coupling import CouplingFlow
 def random_flow(dim: int, seed: int = 0) -> CouplingFlow:
     """A flow with parameters far from its initial identity."""
     torch.manual_seed(seed)
-    flow = CouplingFlow(dim, layers=6, features=24, length_scale=0.8, log_scale_cap=1.5).double()
+    flow = CouplingFlow(dim, layers=6, features=24, length_scales=(0.5, 1.0), log_scale_cap=1.5).double()
     with torch.no_grad():
         for parameter in flow.parameters():
-            parameter.copy_(0.1 * torch.randn_like(parameter))
+            parameter.copy_(0.5 * torch.randn_like(parameter))
     return flow
 
 
@@ -54,7 +54,7 @@ class TestEveryChart:
 
 def test_a_new_flow_is_the_identity():
     x = torch.randn(5, 3)
-    torch.testing.assert_close(CouplingFlow(3, 4, 16, 0.5, 1.5).to_latent(x), x)
+    torch.testing.assert_close(CouplingFlow(3, 4, 16, (0.5,), 1.5).to_latent(x), x)
 
 
 @pytest.mark.parametrize("training", [True, False])

@@ -64,3 +64,21 @@ def test_matrix_exponentials_of_a_rotation_are_rotations():
 
 def test_a_new_field_contracts_at_the_initial_rate():
     torch.testing.assert_close(LinearField(2, min_rate=0.5, initial_rate=3.0).matrix, -3.0 * torch.eye(2))
+
+
+@settings(deadline=None, max_examples=50)
+@given(seed=seeds, spread=st.sampled_from([0.0, 1e-6, 1e-4, 1.0, -1.0]))
+def test_the_closed_form_of_2x2_exponentials_agrees_with_the_series(seed, spread):
+    generator = torch.Generator().manual_seed(seed)
+    rotation = torch.linalg.qr(torch.randn(2, 2, generator=generator, dtype=torch.float64)).Q
+    matrix = rotation @ torch.tensor([[-1.0, spread], [1.0, -1.0]], dtype=torch.float64) @ rotation.T
+    times = torch.linspace(0, 5, 7, dtype=torch.float64)
+    expected = torch.linalg.matrix_exp(matrix * times[:, None, None])
+    torch.testing.assert_close(matrix_exponentials(matrix, times), expected, rtol=1e-7, atol=1e-9)
+
+
+def test_each_trajectory_can_have_its_own_times():
+    field = random_field(5, 3)
+    start, times = torch.randn(4, 3, dtype=torch.float64), torch.rand(4, 6, dtype=torch.float64)
+    each = torch.stack([field.solve(one, own) for one, own in zip(start, times, strict=True)])
+    torch.testing.assert_close(field.solve(start, times), each)

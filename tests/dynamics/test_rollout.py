@@ -82,6 +82,19 @@ def test_the_adaptive_solver_keeps_its_tolerance_for_each_of_many_starts(toleran
     assert (result.states[:3] - exact()).abs().max() < 10 * tolerance
 
 
+@pytest.mark.parametrize("method", ["rk4", "dopri5", "closed_form"])
+def test_states_keep_single_precision_whatever_the_precision_of_the_times(method):
+    single = MATRIX.float()
+
+    class Single(SolvableLinear):
+        def solve(self, start, times):
+            return torch.einsum("tij,...j->...ti", torch.linalg.matrix_exp(single * times[:, None, None]), start)
+
+    result = rollout(Single(lambda x: x @ single.T), STARTS.float(), TIMES, method=method, substeps=10)
+    assert (result.method, result.note) == (method, "")
+    assert_close(result.states, exact().float(), rtol=1e-4, atol=1e-5)
+
+
 def test_no_gradient_is_kept():
     assert not rollout(linear(), STARTS.clone().requires_grad_(), TIMES).states.requires_grad
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geomotion.errors import DatasetError, ShapeMismatch
+from geomotion.errors import DatasetError, ShapeMismatch, UnknownName
 
 Array = NDArray[np.float64]
 
@@ -17,6 +17,7 @@ CHANNEL_UNITS = {
     "velocity_m_per_s": "m/s",
     "joint_velocity_rad_per_s": "rad/s",
 }
+UNIT_NORM_TOLERANCE = 1e-2  # quaternions printed with three digits still pass
 VELOCITY_OF = {"position_m": "velocity_m_per_s", "joints_rad": "joint_velocity_rad_per_s"}
 
 
@@ -44,12 +45,23 @@ class Trajectory:
         return float(self.time_s[-1] - self.time_s[0])
 
     def state(self, channels: Sequence[str]) -> Array:
-        """The named channels side by side, shape (time, D)."""
+        """The named channels side by side, shape (time, D).
+
+        Raises:
+            UnknownName: If the trajectory has no such channel.
+        """
+        for name in channels:
+            if name not in self.channels:
+                raise UnknownName("channel", name, self.channels)
         return np.concatenate([self.channels[name] for name in channels], axis=1)
 
     def velocity(self, channels: Sequence[str]) -> Array:
-        """Time derivatives of the named channels, shape (time, D) [unit of the channel / s]."""
-        return np.concatenate([self.channels[VELOCITY_OF[name]] for name in channels], axis=1)
+        """Time derivatives of the named channels, shape (time, D) [unit of the channel / s].
+
+        Raises:
+            UnknownName: If the trajectory has no velocities of such a channel.
+        """
+        return self.state([VELOCITY_OF.get(name, f"velocity of {name}") for name in channels])
 
 
 @dataclass(frozen=True)
@@ -129,6 +141,15 @@ def validate(name: str, trajectories: Sequence[Trajectory]) -> None:
                 raise DatasetError(
                     name, f"{place}, row {bad[0]}: {channel} is {values[bad[0]].tolist()}; expected finite numbers"
                 )
+            if channel == "orientation_wxyz":
+                _validate_quaternions(name, place, values)
+
+
+def _validate_quaternions(name: str, place: str, q: Array) -> None:
+    norms = np.linalg.norm(q, axis=1)
+    bad = np.flatnonzero(np.abs(norms - 1) > UNIT_NORM_TOLERANCE)
+    if bad.size:
+        raise DatasetError(name, f"{place}, row {bad[0]}: quaternion of norm {norms[bad[0]]:g}; expected 1")
 
 
 def _validate_time(name: str, place: str, time_s: Array) -> None:

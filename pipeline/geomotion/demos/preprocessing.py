@@ -1,6 +1,6 @@
 """Preprocessing as explicit steps in a fixed order; every step that changes something is recorded with the data.
 
-Order: trim, clock from zero, quaternion signs, resample, smooth, align end points, scale, velocities.
+Order: trim, clocks from zero, quaternions, resample, smooth, align end points, scale, velocities.
 """
 
 from collections.abc import Callable
@@ -15,6 +15,7 @@ from geomotion.errors import InvalidSetting
 QUATERNION = "orientation_wxyz"
 LENGTHS = ("position_m", "velocity_m_per_s")
 EVEN_STEPS_TOLERANCE = 1e-3  # relative
+ROUNDING = 1e-12
 SMOOTHING_ORDER = 3
 
 
@@ -30,7 +31,7 @@ def preprocess(demonstrations: Demonstrations, config: PreprocessConfig) -> Demo
     _check_recorded_velocities(demonstrations, config)
     demonstrations = _trim(demonstrations, config)
     demonstrations = _start_clocks_at_zero(demonstrations)
-    demonstrations = _make_quaternions_continuous(demonstrations)
+    demonstrations = _tidy_quaternions(demonstrations)
     demonstrations = _resample(demonstrations, config)
     demonstrations = _smooth(demonstrations, config)
     demonstrations = _align_ends(demonstrations, config)
@@ -40,7 +41,8 @@ def preprocess(demonstrations: Demonstrations, config: PreprocessConfig) -> Demo
 
 def estimate_velocity(time_s: Array, values: Array) -> Array:
     """Differentiate samples at any increasing times, to second order also at both ends, shape (time, axes) [1/s]."""
-    return np.asarray(np.gradient(values, time_s, axis=0, edge_order=min(2, len(time_s) - 1)), dtype=np.float64)
+    gradient = np.gradient(values, time_s, axis=0, edge_order=2 if len(time_s) > 2 else 1)
+    return np.asarray(gradient, dtype=np.float64)
 
 
 def _trim(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
@@ -58,7 +60,8 @@ def _trim(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstra
         channels = {name: values[kept] for name, values in trajectory.channels.items()}
         return replace(trajectory, time_s=trajectory.time_s[kept], channels=channels)
 
-    return _map(demonstrations, trim, f"trimmed {first} points at the start and {last} at the end")
+    parts = [f"{count} points at the {end}" for count, end in ((first, "start"), (last, "end")) if count]
+    return _map(demonstrations, trim, f"trimmed {' and '.join(parts)}")
 
 
 def _start_clocks_at_zero(demonstrations: Demonstrations) -> Demonstrations:
@@ -71,23 +74,32 @@ def _start_clocks_at_zero(demonstrations: Demonstrations) -> Demonstrations:
     )
 
 
-def _make_quaternions_continuous(demonstrations: Demonstrations) -> Demonstrations:
-    """Choose between q and -q: near the previous sample, and at the start near the first demonstration."""
+def _tidy_quaternions(demonstrations: Demonstrations) -> Demonstrations:
+    """Give quaternions unit length, and choose between q and -q.
+
+    The sign is the one nearer to the previous sample, at the start the one nearer to the first demonstration.
+    """
     if QUATERNION not in demonstrations.channel_names:
         return demonstrations
     reference = demonstrations[0].channels[QUATERNION][0]
 
-    def flip(trajectory: Trajectory) -> Trajectory:
+    def tidy(trajectory: Trajectory) -> Trajectory:
         q = trajectory.channels[QUATERNION]
         turns = np.einsum("ti,ti->t", q, np.concatenate([reference[None], q[:-1]]))
         signs = np.cumprod(np.where(turns < 0, -1.0, 1.0))
-        return _with_channels(trajectory, {QUATERNION: q * signs[:, None]})
+        return replace(
+            trajectory, channels=_normalise_quaternions({**trajectory.channels, QUATERNION: q * signs[:, None]})
+        )
 
-    flipped = [flip(trajectory) for trajectory in demonstrations.trajectories]
-    pairs = zip(demonstrations.trajectories, flipped, strict=True)
-    if all(np.array_equal(old.channels[QUATERNION], new.channels[QUATERNION]) for old, new in pairs):
+    tidied = [tidy(trajectory) for trajectory in demonstrations.trajectories]
+    pairs = zip(demonstrations.trajectories, tidied, strict=True)
+    if all(
+        np.allclose(old.channels[QUATERNION], new.channels[QUATERNION], rtol=0, atol=ROUNDING) for old, new in pairs
+    ):
         return demonstrations
-    return demonstrations.with_step(flipped, "chose quaternion signs continuous in time and alike across demonstrations")
+    return demonstrations.with_step(
+        tidied, "normalised quaternions, with signs continuous and alike across demonstrations"
+    )
 
 
 def _resample(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
@@ -98,9 +110,8 @@ def _resample(demonstrations: Demonstrations, config: PreprocessConfig) -> Demon
 
     def resample(trajectory: Trajectory) -> Trajectory:
         time_s = np.linspace(trajectory.time_s[0], trajectory.time_s[-1], points)
-        channels = {
-            name: CubicSpline(trajectory.time_s, values)(time_s) for name, values in _without_velocities(trajectory)
-        }
+        recorded = _without_velocities(trajectory)
+        channels = {name: CubicSpline(trajectory.time_s, values)(time_s) for name, values in recorded.items()}
         return replace(trajectory, time_s=time_s, channels=_normalise_quaternions(channels))
 
     return _map(demonstrations, resample, f"resampled to {points} points, even in time (cubic spline)")
@@ -113,14 +124,12 @@ def _smooth(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonst
 
     def smooth(trajectory: Trajectory) -> Trajectory:
         points = _window_points(trajectory, config.smooth_window_s)
-        channels = {
-            name: savgol_filter(values, points, SMOOTHING_ORDER, axis=0) for name, values in _without_velocities(trajectory)
-        }
+        recorded = _without_velocities(trajectory)
+        channels = {name: savgol_filter(values, points, SMOOTHING_ORDER, axis=0) for name, values in recorded.items()}
         return replace(trajectory, channels=_normalise_quaternions(channels))
 
-    return _map(
-        demonstrations, smooth, f"smoothed over {config.smooth_window_s:g} s (Savitzky-Golay, order {SMOOTHING_ORDER})"
-    )
+    step = f"smoothed over {config.smooth_window_s:g} s (Savitzky-Golay, order {SMOOTHING_ORDER})"
+    return _map(demonstrations, smooth, step)
 
 
 def _window_points(trajectory: Trajectory, window_s: float) -> int:
@@ -133,7 +142,8 @@ def _window_points(trajectory: Trajectory, window_s: float) -> int:
     steps = np.diff(trajectory.time_s)
     mean = float(steps.mean())
     if np.ptp(steps) > EVEN_STEPS_TOLERANCE * mean:
-        raise InvalidSetting(key, window_s, "times even in every demonstration; set dataset.preprocess.resample_points=")
+        expected = "0, or times that are even in every demonstration: set dataset.preprocess.resample_points="
+        raise InvalidSetting(key, window_s, expected)
     points = 2 * round(window_s / mean / 2) + 1
     narrowest = SMOOTHING_ORDER + 2
     if not narrowest <= points <= len(trajectory):
@@ -143,30 +153,29 @@ def _window_points(trajectory: Trajectory, window_s: float) -> int:
 
 
 def _align_ends(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
-    if not config.align_end:
+    names = list(_velocity_channels(demonstrations))
+    if not config.align_end or not names:
         return demonstrations
-    names = [name for name in demonstrations.channel_names if name in VELOCITY_OF]
-    ends = {
-        name: np.mean([trajectory.channels[name][-1] for trajectory in demonstrations.trajectories], axis=0) for name in names
-    }
+    mean_end = np.mean([trajectory.state(names)[-1] for trajectory in demonstrations.trajectories], axis=0)
+    widths = [demonstrations[0].channels[name].shape[1] for name in names]
 
     def align(trajectory: Trajectory) -> Trajectory:
-        return _with_channels(
-            trajectory, {name: trajectory.channels[name] + (ends[name] - trajectory.channels[name][-1]) for name in names}
-        )
+        values = trajectory.state(names)
+        shifted = np.split(values + (mean_end - values[-1]), np.cumsum(widths)[:-1], axis=1)
+        return _with_channels(trajectory, dict(zip(names, shifted, strict=True)))
 
-    return _map(demonstrations, align, f"shifted {', '.join(names)} of every demonstration to end at their mean end point")
+    return _map(demonstrations, align, f"shifted {', '.join(names)} of every demonstration to their mean end point")
 
 
 def _scale(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
     names = [name for name in demonstrations.channel_names if name in LENGTHS]
     if config.scale == 1 or not names:
         return demonstrations
-    return _map(
-        demonstrations,
-        lambda trajectory: _with_channels(trajectory, {name: config.scale * trajectory.channels[name] for name in names}),
-        f"scaled lengths by {config.scale:g}",
-    )
+
+    def scale(trajectory: Trajectory) -> Trajectory:
+        return _with_channels(trajectory, {name: config.scale * trajectory.channels[name] for name in names})
+
+    return _map(demonstrations, scale, f"scaled lengths by {config.scale:g}")
 
 
 def _velocity_channels(demonstrations: Demonstrations) -> dict[str, str]:
@@ -183,13 +192,13 @@ def _check_recorded_velocities(demonstrations: Demonstrations, config: Preproces
 def _provide_velocities(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
     wanted = _velocity_channels(demonstrations)
     survived = set(wanted.values()) <= set(demonstrations.channel_names)
-    if config.velocity is VelocitySource.recorded and survived:
+    if not wanted or (config.velocity is VelocitySource.recorded and survived):
         return demonstrations
 
     def estimate(trajectory: Trajectory) -> Trajectory:
+        positions = {velocity: trajectory.channels[name] for name, velocity in wanted.items()}
         return _with_channels(
-            trajectory,
-            {velocity: estimate_velocity(trajectory.time_s, trajectory.channels[name]) for name, velocity in wanted.items()},
+            trajectory, {name: estimate_velocity(trajectory.time_s, values) for name, values in positions.items()}
         )
 
     return _map(demonstrations, estimate, "estimated velocities by second-order differences")
@@ -203,8 +212,8 @@ def _with_channels(trajectory: Trajectory, channels: dict[str, Array]) -> Trajec
     return replace(trajectory, channels={**trajectory.channels, **channels})
 
 
-def _without_velocities(trajectory: Trajectory) -> list[tuple[str, Array]]:
-    return [(name, values) for name, values in trajectory.channels.items() if name not in VELOCITY_OF.values()]
+def _without_velocities(trajectory: Trajectory) -> dict[str, Array]:
+    return {name: values for name, values in trajectory.channels.items() if name not in VELOCITY_OF.values()}
 
 
 def _normalise_quaternions(channels: dict[str, Array]) -> dict[str, Array]:

@@ -100,7 +100,7 @@ def _episodes(demonstrations: Demonstrations) -> "pa.Table":
 
     ends = np.cumsum([len(trajectory) for trajectory in demonstrations.trajectories])
     count = len(demonstrations)
-    zeros = np.zeros(count, dtype=np.int64)
+    first_file = ("data/chunk_index", "data/file_index", "meta/episodes/chunk_index", "meta/episodes/file_index")
     return pa.table(
         {
             "episode_index": np.arange(count),
@@ -109,7 +109,7 @@ def _episodes(demonstrations: Demonstrations) -> "pa.Table":
             "length": np.diff(ends, prepend=0),
             "dataset_from_index": np.concatenate([[0], ends[:-1]]),
             "dataset_to_index": ends,
-            **{f"{part}_index": zeros for part in ("data/chunk", "data/file", "meta/episodes/chunk", "meta/episodes/file")},
+            **{column: np.zeros(count, dtype=np.int64) for column in first_file},
         }
     )
 

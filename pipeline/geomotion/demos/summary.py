@@ -53,36 +53,40 @@ def _numbers(trajectory: Trajectory, channel: str) -> dict[str, Any]:
 def summary_table(summary: dict[str, Any]) -> str:
     """The summary as lines of plain text."""
     unit, total = summary["unit"], summary["total"]
-    heads = ["demo", "set", "points", "duration [s]", f"length [{unit}]", f"speed [{unit}/s]", f"start [{unit}]", f"end [{unit}]"]
-    rows = [
-        [
-            str(demo["demo"]), demo["set"], str(demo["points"]), f"{demo['duration_s']:.3f}", f"{demo['path_length']:.4f}",
-            f"{demo['mean_speed']:.4f}", _vector(demo["start"]), _vector(demo["end"]),
-        ]
-        for demo in summary["demos"]
-    ]  # fmt: skip
-    if any(demo["label"] for demo in summary["demos"]):
-        heads.append("label")
-        rows = [[*row, demo["label"]] for row, demo in zip(rows, summary["demos"], strict=True)]
+    columns = {
+        "demo": [str(demo["demo"]) for demo in summary["demos"]],
+        "set": [demo["set"] for demo in summary["demos"]],
+        "points": [str(demo["points"]) for demo in summary["demos"]],
+        "duration [s]": [f"{demo['duration_s']:.3f}" for demo in summary["demos"]],
+        f"length [{unit}]": [f"{demo['path_length']:.4f}" for demo in summary["demos"]],
+        f"speed [{unit}/s]": [f"{demo['mean_speed']:.4f}" for demo in summary["demos"]],
+        f"start [{unit}]": [_vector(demo["start"]) for demo in summary["demos"]],
+        f"end [{unit}]": [_vector(demo["end"]) for demo in summary["demos"]],
+        "label": [demo["label"] for demo in summary["demos"]],
+    }
     channels = ", ".join(f"{name} ({width})" for name, width in summary["channels"].items())
     return "\n".join(
         [
-            f"{summary['name']}: {total['demos']} demonstrations, {total['points']} points, {total['duration_s']:.2f} s",
+            f"{summary['name']}: {total['demos']} demonstrations, {total['points']} points, "
+            f"{total['duration_s']:.2f} s",
             f"space     {summary['space']}, frame: {summary['frame']}",
             f"channels  {channels}",
             f"source    {summary['source']}",
             f"licence   {summary['licence'] or 'not stated'}",
             *(f"step {number}    {step}" for number, step in enumerate(summary["steps"], start=1)),
             "",
-            *_aligned([heads, *rows]),
+            *_lines({head: cells for head, cells in columns.items() if any(cells)}),
         ]
     )
 
 
 def _vector(values: list[float]) -> str:
-    return "(" + ", ".join(f"{value + 0.0:.3f}" for value in values) + ")"
+    """Coordinates without negative zeros."""
+    return "(" + ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in values) + ")"
 
 
-def _aligned(rows: list[list[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+def _lines(columns: dict[str, list[str]]) -> list[str]:
+    """Columns side by side, each aligned to the right under its head."""
+    widths = [max(map(len, [head, *cells])) for head, cells in columns.items()]
+    rows = [list(columns), *zip(*columns.values(), strict=True)]
+    return ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]

@@ -5,7 +5,7 @@ from typing import Protocol, runtime_checkable
 
 from torch import nn
 
-from geomotion.types import State, Tensor, Times, Trajectories, Velocity
+from geomotion.types import Float, State, Tensor, Trajectories, Velocity
 
 PushForward = Callable[[Tensor], Tensor]
 
@@ -25,8 +25,8 @@ class VectorField(Protocol):
 class SolvableField(VectorField, Protocol):
     """A field whose trajectories are known in closed form."""
 
-    def solve(self, start: State, times: Times) -> Trajectories:
-        """States at the given times after the start [s]."""
+    def solve(self, start: State, times: Float[Tensor, "*#batch time"]) -> Trajectories:
+        """States at the given times after the start, which may be the same for all or each one's own."""
         ...
 
 
@@ -79,7 +79,7 @@ class ChartedField(nn.Module):
         """Whether trajectories are known in closed form."""
         return isinstance(self.field, SolvableField)
 
-    def solve(self, start: State, times: Times) -> Trajectories:
+    def solve(self, start: State, times: Float[Tensor, "*#batch time"]) -> Trajectories:
         """ψ⁻¹ of the latent trajectory, at times after the start [s]; only where the latent field has one."""
         assert isinstance(self.field, SolvableField)
         return self.chart.to_ambient(self.field.solve(self.chart.to_latent(start), times / self.time_unit_s))

@@ -113,8 +113,10 @@ class LineIntegralField(nn.Module):
 
     def forward(self, x: State) -> Velocity:
         direction = (x - self.base_point).unsqueeze(-2)
-        # Not a nested def: its shape annotations would be evaluated in every call, for as long as a small network takes.
-        integrand: Integrand = lambda t: self._contract(self.base_point + t.unsqueeze(-1) * direction, direction)
+        # Not a nested def: evaluating its shape annotations in every call would cost a quarter of a query.
+        integrand: Integrand = lambda t: self._jacobian_product(
+            self.base_point + t.unsqueeze(-1) * direction, direction
+        )
         return self.integrator(integrand, self.base_velocity.expand_as(x))
 
     def contraction_jacobian(self, x: State) -> Matrix:
@@ -122,7 +124,7 @@ class LineIntegralField(nn.Module):
         root = self.jacobian_root(x)
         return -(root.mT @ root + torch.diag_embed(self.regulariser(x)))
 
-    def _contract(self, x: State, vector: Float[Tensor, "#*batch D"]) -> State:
+    def _jacobian_product(self, x: State, vector: Float[Tensor, "#*batch D"]) -> State:
         """Ĵ(x) v without forming Ĵ."""
         root = self.jacobian_root(x)
         return -(root.mT @ (root @ vector.unsqueeze(-1))).squeeze(-1) - self.regulariser(x) * vector

@@ -80,7 +80,7 @@ def rollout(
     method = _resolve(field, method)
     note = ""
     if method == "closed_form":
-        states = field.solve(starts, times - times[0])  # type: ignore[attr-defined]
+        states = field.solve(starts, (times - times[0]).to(starts))  # type: ignore[attr-defined]
     elif method == "dopri5":
         try:
             states = _dopri5(field, starts, times, relative_tolerance, absolute_tolerance)
@@ -157,7 +157,7 @@ def _dopri5(field: VectorField, starts: State, times: Times, rtol: float, atol: 
     options: dict[str, Any] = {"norm": lambda error: error.abs().max(), "max_num_steps": MAX_ADAPTIVE_STEPS}
     try:
         states: Tensor = odeint(
-            lambda _, x: field(x), starts, times.to(starts), method="dopri5", rtol=rtol, atol=atol, options=options
+            lambda _, x: field(x), starts, times, method="dopri5", rtol=rtol, atol=atol, options=options
         )
     except AssertionError as error:
         if not str(error).startswith(ADAPTIVE_FAILURES):

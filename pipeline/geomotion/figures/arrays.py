@@ -123,6 +123,13 @@ class EvaluationArrays:
         return int(self.judged[0].demonstration.shape[1])
 
     @property
+    def extent(self) -> Array:
+        """Planar states that a map has to show [m], shape (n, 2)."""
+        return (
+            self.flow.points if self.flow is not None else np.concatenate([item.demonstration for item in self.judged])
+        )
+
+    @property
     def has_held_out(self) -> bool:
         """Whether any judged demonstration was kept from training."""
         return any(item.held_out for item in self.judged)

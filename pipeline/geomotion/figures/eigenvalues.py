@@ -10,12 +10,13 @@ from matplotlib.figure import Figure
 
 from geomotion.figures.arrays import Array, EigenvalueGrid, EvaluationArrays
 from geomotion.figures.motion import draw_demonstrations
-from geomotion.figures.style import COLOUR, label_plane, new_figure, paper_style, percent
+from geomotion.figures.style import COLOUR, label_plane, new_figure, panel_size_mm, paper_style, percent
 
 COLOURMAP = "RdBu_r"  # blue contracts, red does not
 PERCENTILE = 95.0  # eigenvalues beyond it share the last colour, so that a few of them do not wash out the rest
 LABEL = r"$\lambda_{\max}$ of the symmetric part [1/s]"
 BINS = 40
+TITLE_MM = 54  # what a title needs
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Panel:
     @property
     def title(self) -> str:
         """Name and share."""
-        return f"{self.name}\n{percent(self.share_not_contracting)} of {len(self.eigenvalues)} points not contracting"
+        return f"{self.name}\n{percent(self.share_not_contracting)} not contracting (n = {len(self.eigenvalues)})"
 
 
 def panels(grid: EigenvalueGrid) -> list[Panel]:
@@ -92,7 +93,8 @@ def figure_eigenvalues(data: EvaluationArrays) -> Figure:
 def _figure_maps(data: EvaluationArrays, grid: EigenvalueGrid) -> Figure:
     shown = panels(grid)
     norm = robust_norm([panel.eigenvalues for panel in shown])
-    figure = new_figure(width_mm=65 * len(shown) + 25, height_mm=75)
+    width_mm, height_mm = panel_size_mm(grid.points, side_mm=60)
+    figure = new_figure(len(shown) * max(width_mm + 6, TITLE_MM) + 28, height_mm + 22)
     axes = figure.subplots(1, len(shown), sharex=True, sharey=True, squeeze=False)[0]
     for ax, panel in zip(axes, shown, strict=True):
         draw_eigenvalue_map(ax, grid.points, grid.shape, panel, norm)

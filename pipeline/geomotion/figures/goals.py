@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from geomotion.figures.arrays import EvaluationArrays, GoalStarts
 from geomotion.figures.motion import draw_demonstrations, draw_flow, draw_goal
-from geomotion.figures.style import COLOUR, label_plane, new_figure, paper_style
+from geomotion.figures.style import COLOUR, label_plane, new_figure, panel_size_mm, paper_style
 
 
 def draw_goal_starts(ax: Axes, goal_starts: GoalStarts) -> Axes:
@@ -24,7 +24,8 @@ def draw_goal_starts(ax: Axes, goal_starts: GoalStarts) -> Axes:
 def figure_goal_starts(data: EvaluationArrays) -> Figure:
     """A map of the starts that fail. `data.goal_starts` has to be present and planar."""
     assert data.goal_starts is not None
-    figure = new_figure(width_mm=120, height_mm=105)
+    width_mm, height_mm = panel_size_mm(data.extent, side_mm=95)
+    figure = new_figure(width_mm + 15, height_mm + 20)
     ax = figure.add_subplot()
     if data.flow is not None:
         draw_flow(ax, data.flow)

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from geomotion.figures.arrays import Array, EvaluationArrays, Flow, Judged
-from geomotion.figures.style import COLOUR, label_plane, new_figure, paper_style, state_label
+from geomotion.figures.style import COLOUR, label_plane, new_figure, panel_size_mm, paper_style, state_label
 
+LEGEND_MM = 110  # what the legend needs
 GRID_ROLLOUTS = 8  # of those that start on the grid: enough to see where they go, few enough to see the field
 COLUMNS = 2
 DIVERGENCE_MARGIN = 0.3  # of the range of the demonstrations
@@ -96,7 +97,8 @@ def widely_spread(points: Array, count: int) -> list[int]:
 
 
 def _figure_plane(data: EvaluationArrays) -> Figure:
-    figure = new_figure(width_mm=120, height_mm=105)
+    width_mm, height_mm = panel_size_mm(data.extent, side_mm=95)
+    figure = new_figure(max(width_mm + 15, LEGEND_MM), height_mm + 20)
     ax = figure.add_subplot()
     if data.flow is not None:
         draw_flow(ax, data.flow)

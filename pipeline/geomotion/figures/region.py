@@ -7,8 +7,9 @@ from matplotlib.patches import Polygon
 
 from geomotion.figures.arrays import Array, EvaluationArrays, Mask, Region
 from geomotion.figures.motion import draw_demonstrations
-from geomotion.figures.style import COLOUR, label_plane, limit_to, new_figure, paper_style
+from geomotion.figures.style import COLOUR, label_plane, limit_to, new_figure, panel_size_mm, paper_style
 
+HISTOGRAM_MM = 55
 DRAWN_POINTS = 250  # per rollout; more are not visible and make the PDF heavy
 
 
@@ -35,7 +36,7 @@ def draw_steps_inside(ax: Axes, region: Region) -> Axes:
     mean = f"mean {steps.mean():.0f} ± {steps.std():.0f}"
     ax.axvline(steps.mean(), color="black", linestyle="--", linewidth=1, label=mean)
     ax.set(xlabel=f"time steps inside, of {total} [1]", ylabel=f"rollouts, of {len(steps)} [1]", xlim=(0, total))
-    ax.legend(loc="upper left")
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return ax
 
 
@@ -43,8 +44,9 @@ def draw_steps_inside(ax: Axes, region: Region) -> Axes:
 def figure_region(data: EvaluationArrays) -> Figure:
     """Rollouts in and out of the demonstration region, and for how long. `data.region` has to be present."""
     assert data.region is not None
-    figure = new_figure(width_mm=170, height_mm=80)
-    left, right = figure.subplots(1, 2, width_ratios=(1.25, 1))
+    width_mm, height_mm = panel_size_mm(data.region.rollouts[:, 0], side_mm=70)
+    figure = new_figure(width_mm + HISTOGRAM_MM + 20, max(height_mm, HISTOGRAM_MM) + 20)
+    left, right = figure.subplots(1, 2, width_ratios=(width_mm, HISTOGRAM_MM))
     draw_region(left, data.region)
     draw_demonstrations(left, data.judged)
     left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)

@@ -20,6 +20,7 @@ from geomotion.files import atomic
 
 MM_PER_INCH = 25.4
 PNG_DPI = 200
+ASPECTS = (0.4, 2.5)  # narrowest and widest panel, width / height
 
 FONTS: dict[str, Any] = {
     "font.family": "sans-serif",
@@ -71,9 +72,21 @@ def paper_style() -> Iterator[None]:
         yield
 
 
-def new_figure(width_mm: float, height_mm: float) -> Figure:
+def new_figure(width_mm: float | int, height_mm: float | int) -> Figure:
     """An empty figure that is not known to pyplot."""
     return Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
+
+
+def panel_size_mm(points: NDArray[np.float64], side_mm: float | int) -> tuple[float, float]:
+    """Width and height of a panel with equal scales, of about the area of a square with the given side.
+
+    Args:
+        points: What it shows, shape (n, 2).
+        side_mm: Side of that square [mm].
+    """
+    width, height = np.ptp(points, axis=0)
+    stretch = float(np.sqrt(np.clip(width / height if height > 0 else np.inf, *ASPECTS)))
+    return side_mm * stretch, side_mm / stretch
 
 
 def state_label(axis: int) -> str:

@@ -1,14 +1,16 @@
 """Invertible flows of affine couplings whose derivatives are written out.
 
-A coupling keeps some coordinates and moves the others, b ↦ e^{s(a)} b + t(a). Scale and shift are linear in fixed
-random Fourier features of the kept coordinates a, so value, inverse and derivative of a layer are a few small
-products, and one pass through the conditioners serves ψ(x) and Dψ(x)⁻¹ ż alike.
+A coupling keeps some coordinates a and moves the others, b ↦ e^{s(a)} b + t(a). Scale and shift are linear in fixed
+Fourier features of the kept coordinates, so value, inverse and derivative of a layer are a few small products, and one
+pass through the conditioners serves ψ(x) and Dψ(x)⁻¹ ż alike.
 
-Which coordinates are kept is a matter of zeros in the layer's matrices: nothing is gathered or concatenated, which
-would cost more than the arithmetic where a control loop asks for one state at a time.
+Which coordinates are kept is a matter of zeros in the layers' matrices: all layers have the same shapes in any
+dimension, and nothing is gathered or concatenated, which would cost more than the arithmetic where a control loop asks
+for one state at a time.
 """
 
 import math
+from collections.abc import Sequence
 
 import torch
 from torch import nn
@@ -16,72 +18,7 @@ from torch import nn
 from geomotion.dynamics.fields import PushForward
 from geomotion.types import Bool, Float, State, Tensor
 
-
-class CouplingLayer(nn.Module):
-    """One affine coupling; the identity at the start.
-
-    Args:
-        moved: Which coordinates are scaled and shifted; the others condition them.
-        frequencies: Fixed frequencies of the features; rows of moved coordinates do not count.
-        phases: Their phases.
-        log_scale_cap: Largest |s|.
-    """
-
-    frequencies: Tensor
-    phases: Tensor
-    mask: Tensor
-
-    def __init__(
-        self,
-        moved: Bool[Tensor, " D"],
-        frequencies: Float[Tensor, "D feature"],
-        phases: Float[Tensor, " feature"],
-        log_scale_cap: float,
-    ) -> None:
-        super().__init__()
-        self.register_buffer("frequencies", frequencies * ~moved[:, None])
-        self.register_buffer("phases", phases)
-        self.register_buffer("mask", torch.cat([moved, moved]).to(frequencies))
-        self.log_scale_cap = log_scale_cap
-        self.gain = math.sqrt(2 / len(phases))
-        self.weight = nn.Parameter(torch.zeros(len(phases), 2 * len(moved)))
-        self.bias = nn.Parameter(torch.zeros(2 * len(moved)))
-
-    def _angles(self, x: State) -> Tensor:
-        return x @ self.frequencies + self.phases
-
-    def _weight(self) -> Tensor:
-        return self.weight * (self.gain * self.mask)
-
-    def _condition(self, angles: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
-        """tanh of the raw log scale, and the shift; zero for kept coordinates."""
-        raw, shift = (torch.cos(angles) @ weight + self.bias * self.mask).chunk(2, -1)
-        return torch.tanh(raw), shift
-
-    def forward(self, x: State) -> State:
-        squashed, shift = self._condition(self._angles(x), self._weight())
-        return x * (self.log_scale_cap * squashed).exp() + shift
-
-    def inverse(self, y: State) -> State:
-        """The x with forward(x) = y."""
-        squashed, shift = self._condition(self._angles(y), self._weight())
-        return (y - shift) * (-self.log_scale_cap * squashed).exp()
-
-    def linearise(self, x: State) -> tuple[State, PushForward]:
-        """forward(x), and the inverse of its derivative as a function of tangents at forward(x)."""
-        angles, weight = self._angles(x), self._weight()
-        squashed, shift = self._condition(angles, weight)
-        scale = (self.log_scale_cap * squashed).exp()
-        scaled = x * scale
-
-        def push_forward(tangent: Tensor) -> Tensor:
-            # kept coordinates of a tangent pass unchanged, so its angles can be taken before the layer is undone
-            features_rate = torch.sin(angles) * (tangent @ self.frequencies)
-            raw_rate, shift_rate = (features_rate @ weight).chunk(2, -1)  # up to sign: cos' = -sin
-            log_scale_rate = raw_rate * (1 - squashed * squashed) * self.log_scale_cap
-            return (tangent + scaled * log_scale_rate + shift_rate) / scale
-
-        return scaled + shift, push_forward
+TAIL = 1e-4  # quasi-random numbers are kept this far from 0 and 1, where the normal quantile is infinite
 
 
 class CouplingFlow(nn.Module):
@@ -92,46 +29,95 @@ class CouplingFlow(nn.Module):
     Args:
         dim: D, at least 2.
         layers: Couplings.
-        features: Random Fourier features of each.
-        length_scale: Over which the features vary, in the input's units.
-        log_scale_cap: Largest |log scale| of one coupling.
+        features: Fourier features of each, per kept coordinate; cosine and sine of one angle count as two.
+        length_scales: Over which the features vary, in the input's units; the features are spread evenly over them.
+        log_scale_cap: Largest |s| of one coupling.
     """
 
-    def __init__(self, dim: int, layers: int, features: int, length_scale: float, log_scale_cap: float) -> None:
+    frequencies: Tensor
+    moved: Tensor
+
+    def __init__(
+        self, dim: int, layers: int, features: int, length_scales: Sequence[float], log_scale_cap: float
+    ) -> None:
         super().__init__()
         self.dim = dim
-        self.layers = nn.ModuleList()
-        order = torch.arange(dim)
-        for number in range(layers):
-            if dim > 2 and number % 2 == 0:
-                order = torch.randperm(dim)
-            moved = torch.zeros(dim, dtype=torch.bool)
-            moved[order[dim // 2 :] if number % 2 == 0 else order[: dim // 2]] = True
-            frequencies = torch.randn(dim, features) / length_scale
-            self.layers.append(CouplingLayer(moved, frequencies, 2 * math.pi * torch.rand(features), log_scale_cap))
+        self.log_scale_cap = log_scale_cap
+        kept = alternating_halves(dim, layers)
+        angles = features // 2 * (dim // 2)
+        frequencies = torch.zeros(layers, dim, angles)
+        for layer in range(layers):
+            frequencies[layer, kept[layer]] = normal_frequencies(angles, int(kept[layer].sum()), length_scales)
+        self.register_buffer("frequencies", frequencies)
+        self.register_buffer("moved", (~kept).to(frequencies))
+        self.gain = math.sqrt(1 / angles)  # each pair of cosine and sine has norm 1
+        self.weight = nn.Parameter(torch.zeros(layers, 2 * angles, 2 * dim))
+        self.bias = nn.Parameter(torch.zeros(layers, 2 * dim))
 
     def to_latent(self, x: State) -> State:
         """ψ(x)."""
-        for layer in self.layers:
-            x = layer(x)
+        for frequencies, weight, bias in self._layers():
+            squashed, shift, _ = self._condition(x, frequencies, weight, bias)
+            x = torch.addcmul(shift, x, (self.log_scale_cap * squashed).exp())
         return x
 
     def to_ambient(self, z: State) -> State:
         """ψ⁻¹(z)."""
-        for layer in reversed(self.layers):
-            z = layer.inverse(z)
+        for frequencies, weight, bias in reversed(self._layers()):
+            # kept coordinates are the same on both sides of a layer, so its conditioner can be asked again
+            squashed, shift, _ = self._condition(z, frequencies, weight, bias)
+            z = (z - shift) * (-self.log_scale_cap * squashed).exp()
         return z
 
     def linearise(self, x: State) -> tuple[State, PushForward]:
         """ψ(x) and ż ↦ Dψ(x)⁻¹ ż."""
-        pushes: list[PushForward] = []
-        for layer in self.layers:
-            x, push = layer.linearise(x)
-            pushes.append(push)
+        tape = []
+        for frequencies, weight, bias in self._layers():
+            squashed, shift, features = self._condition(x, frequencies, weight, bias)
+            scale = (self.log_scale_cap * squashed).exp()
+            tape.append((frequencies, weight, features, squashed, scale, x))
+            x = torch.addcmul(shift, x, scale)
 
         def push_forward(tangent: Tensor) -> Tensor:
-            for push in reversed(pushes):
-                tangent = push(tangent)
+            for frequencies, weight, features, squashed, scale, x in reversed(tape):
+                cosine, sine = features.chunk(2, -1)
+                angle_rate = tangent @ frequencies
+                raw_rate, shift_rate = (torch.cat([-sine * angle_rate, cosine * angle_rate], -1) @ weight).chunk(2, -1)
+                log_scale_rate = raw_rate * (1 - squashed * squashed)
+                tangent = (tangent - shift_rate) / scale - x * log_scale_rate
             return tangent
 
         return x, push_forward
+
+    def _layers(self) -> list[tuple[Tensor, Tensor, Tensor]]:
+        """Frequencies, weight and bias of each layer, with zeros where kept coordinates would be moved."""
+        mask = torch.cat([self.moved, self.moved], -1)
+        weight = self.weight * (self.gain * mask[:, None])
+        return list(zip(self.frequencies.unbind(), weight.unbind(), (self.bias * mask).unbind(), strict=True))
+
+    def _condition(self, x: State, frequencies: Tensor, weight: Tensor, bias: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """s / cap and t, zero for kept coordinates, and the features behind them."""
+        angles = x @ frequencies
+        features = torch.cat([angles.cos(), angles.sin()], -1)
+        raw, shift = (features @ weight + bias).chunk(2, -1)
+        return torch.tanh(raw / self.log_scale_cap), shift, features
+
+
+def alternating_halves(dim: int, layers: int) -> Bool[Tensor, "layer D"]:
+    """Which coordinates each layer keeps: a half and then the other, a new random half for every pair of layers."""
+    kept = torch.zeros(layers, dim, dtype=torch.bool)
+    order = torch.arange(dim)
+    for layer in range(layers):
+        if layer % 2 == 0 and dim > 2:
+            order = torch.randperm(dim)
+        kept[layer, order[: dim // 2] if layer % 2 == 0 else order[dim // 2 :]] = True
+    return kept
+
+
+def normal_frequencies(count: int, dim: int, length_scales: Sequence[float]) -> Float[Tensor, "dim count"]:
+    """Quasi-random samples of N(0, I / ℓ²), which cover the spectrum more evenly than random ones."""
+    seed = int(torch.randint(2**31 - 1, ()))
+    uniform = torch.quasirandom.SobolEngine(dim, scramble=True, seed=seed).draw(count, dtype=torch.float64)
+    normal = torch.special.ndtri(uniform.clamp(TAIL, 1 - TAIL))
+    scales = torch.tensor(length_scales, dtype=torch.float64)[torch.arange(count) % len(length_scales)]
+    return (normal / scales[:, None]).T.float()

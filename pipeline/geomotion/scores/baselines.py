@@ -7,15 +7,15 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from geomotion.scores.curves import Curve, dtwd_per_point
+from geomotion.scores.curves import Curve, Curves, OtherCurve, dtwd_per_point
 
 
-def distances_between(curves: Sequence[Curve]) -> Float[np.ndarray, " pair"]:
+def distances_between(curves: Curves) -> Float[np.ndarray, " pair"]:
     """DTWD per point of every pair of different curves [m]."""
     return np.array([dtwd_per_point(one, other) for one, other in combinations(curves, 2)])
 
 
-def distances_to_nearest(curves: Sequence[Curve], candidates: Sequence[Curve]) -> Float[np.ndarray, " curve"]:
+def distances_to_nearest(curves: Curves, candidates: Curves) -> Float[np.ndarray, " curve"]:
     """DTWD per point of each curve to the nearest candidate [m]; a curve is no candidate for itself."""
     return np.array(
         [
@@ -25,7 +25,7 @@ def distances_to_nearest(curves: Sequence[Curve], candidates: Sequence[Curve]) -
     )
 
 
-def averaged_curve(curves: Sequence[Curve], times_s: Sequence[Float[np.ndarray, " time"]]) -> Curve:
+def averaged_curve(curves: Curves, times_s: Sequence[Float[np.ndarray, " _"]]) -> OtherCurve:
     """Mean of the curves at equal shares of their durations, with as many points as the longest of them."""
     shares = np.linspace(0.0, 1.0, max(len(curve) for curve in curves))
     resampled = []
@@ -35,7 +35,7 @@ def averaged_curve(curves: Sequence[Curve], times_s: Sequence[Float[np.ndarray, 
     return np.asarray(np.mean(resampled, axis=0))
 
 
-def nearest_neighbour_velocities(states: Curve, known_states: Curve, known_velocities: Curve) -> Curve:
+def nearest_neighbour_velocities(states: Curve, known_states: OtherCurve, known_velocities: OtherCurve) -> Curve:
     """Velocity of the nearest known state, for each state: the simplest model without training."""
     _, nearest = cKDTree(known_states).query(states)
     return np.asarray(known_velocities[nearest])

@@ -3,6 +3,7 @@
 Distances have the unit of the curves [m]; nothing here scales or resamples.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,8 @@ from scipy.spatial.distance import cdist
 
 Curve = Float[np.ndarray, "time D"]
 OtherCurve = Float[np.ndarray, "other_time D"]
+AnyCurve = Float[np.ndarray, "_ D"]  # in collections, where the number of points differs
+Curves = Sequence[AnyCurve]
 
 
 def dtwd_sum(curve: Curve, other: OtherCurve) -> float:
@@ -44,57 +47,60 @@ def _nearest_distances(
 
 @dataclass(frozen=True)
 class Alignment:
-    """Optimal monotone alignment of two curves.
+    """Monotone alignment of two curves with the smallest sum of distances.
 
     Attributes:
-        cost: Sum (time warping) or maximum (Fréchet) of the distances along the path [m].
-        pairs: Number of point pairs on the path.
+        sum: Sum of the distances along the path [m].
+        pairs: Number of point pairs on the path; of equally good paths, one that prefers steps on both curves.
     """
 
-    cost: float
+    sum: float
     pairs: int
 
     @property
     def mean(self) -> float:
-        """Cost per pair of the path [m]."""
-        return self.cost / self.pairs
+        """Mean distance along the path [m]."""
+        return self.sum / self.pairs
 
 
 def dynamic_time_warping(curve: Curve, other: OtherCurve) -> Alignment:
     """Alignment that goes forward on both curves and has the smallest sum of distances."""
-    return _align(cdist(curve, other), np.add)
+    totals = _cheapest_paths(cdist(curve, other), np.add)
+    return Alignment(float(totals[-1, -1]), _count_pairs(totals))
 
 
 def discrete_frechet(curve: Curve, other: OtherCurve) -> float:
     """Smallest possible largest distance of an alignment that goes forward on both curves [m]."""
-    return _align(cdist(curve, other), np.maximum).cost
+    return float(_cheapest_paths(cdist(curve, other), np.maximum)[-1, -1])
 
 
-def _align(costs: Float[np.ndarray, "n m"], accumulate: np.ufunc) -> Alignment:
-    """Dynamic programme over the anti-diagonals of `costs`, each of which is one vector operation.
+def _cheapest_paths(costs: Float[np.ndarray, "n m"], accumulate: np.ufunc) -> Float[np.ndarray, "n+m+1 n+1"]:
+    """Cost of the cheapest monotone path to each cell, one anti-diagonal of `costs` at a time.
 
-    Row k of the skewed array holds the cells (i, k - i) in column i. The programme's values carry one cell of
-    padding in front, so that the three predecessors of column i are plain shifts.
+    Cell (i, j) stands in row i + j + 2, column i + 1. Two rows and a column of padding make its predecessors
+    (i-1, j-1), (i-1, j), (i, j-1) plain shifts: two rows up and one left, one up and one left, one up.
     """
     n, m = costs.shape
     rows = np.arange(n)[:, None]
     skewed = np.full((n + m - 1, n), np.inf)
     skewed[rows + np.arange(m), rows] = costs
+    totals = np.full((n + m + 1, n + 1), np.inf)
+    totals[0, 0] = 0.0  # every path starts in the first cell
+    for diagonal, cost in enumerate(skewed):
+        before = np.minimum(totals[diagonal, :-1], np.minimum(totals[diagonal + 1, :-1], totals[diagonal + 1, 1:]))
+        accumulate(cost, before, out=totals[diagonal + 2, 1:])
+    return totals
 
-    outside = np.full(n + 1, np.inf)
-    before_previous, previous = outside.copy(), outside.copy()
-    before_previous[0] = 0.0  # the path starts in the first cell
-    pairs_before_previous, pairs_previous = np.zeros(n + 1, dtype=int), np.zeros(n + 1, dtype=int)
-    columns = np.arange(n)
-    for diagonal in skewed:
-        # The diagonal move comes first: among equally good paths it is the shortest.
-        predecessors = np.stack([before_previous[:-1], previous[:-1], previous[1:]])
-        pairs = np.stack([pairs_before_previous[:-1], pairs_previous[:-1], pairs_previous[1:]])
-        best = predecessors.argmin(axis=0)
-        before_previous, pairs_before_previous = previous, pairs_previous
-        previous = np.concatenate([[np.inf], accumulate(diagonal, predecessors[best, columns])])
-        pairs_previous = np.concatenate([[0], pairs[best, columns] + 1])
-    return Alignment(float(previous[n]), int(pairs_previous[n]))
+
+def _count_pairs(totals: Float[np.ndarray, "rows columns"]) -> int:
+    """Follow the cheapest path back from the last cell to the first."""
+    row, column = totals.shape[0] - 1, totals.shape[1] - 1
+    pairs = 1
+    while row > 2:
+        predecessors = ((row - 2, column - 1), (row - 1, column - 1), (row - 1, column))
+        row, column = min(predecessors, key=lambda cell: float(totals[cell]))
+        pairs += 1
+    return pairs
 
 
 def end_point_error(curve: Curve, other: OtherCurve) -> float:

@@ -8,6 +8,8 @@ from jaxtyping import Float
 
 Points = Float[np.ndarray, "point D"]
 
+FLATTEST_AXIS = 0.01  # of the diagonal: a grid over demonstrations along one axis stays a grid
+
 
 @dataclass(frozen=True)
 class Box:
@@ -32,12 +34,14 @@ class Box:
         return float(np.linalg.norm(self.upper - self.lower))
 
     def enlarged(self, margin: float) -> "Box":
-        """With `margin` times its extent added on each side of each axis."""
-        extra = margin * (self.upper - self.lower)
-        return Box(self.lower - extra, self.upper + extra)
+        """With `margin` times its extent added on each side of each axis; no axis is left flat."""
+        extent = np.maximum(self.upper - self.lower, FLATTEST_AXIS * self.diagonal)
+        centre = (self.lower + self.upper) / 2
+        reach = (0.5 + margin) * extent
+        return Box(centre - reach, centre + reach)
 
 
-def bounding_box(curves: Sequence[Points]) -> Box:
+def bounding_box(curves: Sequence[Float[np.ndarray, "_ D"]]) -> Box:
     """Smallest box around all points."""
     points = np.concatenate(curves)
     return Box(points.min(axis=0), points.max(axis=0))

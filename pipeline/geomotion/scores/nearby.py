@@ -22,7 +22,7 @@ def nearby_starts(
 def pairwise_distances(trajectories: Float[np.ndarray, "start time D"]) -> Distances:
     """Distance of every pair of trajectories at equal times."""
     first, second = np.triu_indices(len(trajectories), k=1)
-    return np.linalg.norm(trajectories[first] - trajectories[second], axis=-1)
+    return np.asarray(np.linalg.norm(trajectories[first] - trajectories[second], axis=-1))
 
 
 def judge_nearby(

@@ -32,16 +32,31 @@ class Judged:
     is_trained: bool
 
 
-CURVE_SCORES: dict[str, tuple[Callable[[curves.Curve, curves.Curve], float], str]] = {
-    "dtwd_per_point": (curves.dtwd_per_point, "Sec. 6.4, each direction divided by its number of points"),
-    "dtwd_sum": (curves.dtwd_sum, "Sec. 6.4, summed over the points of both curves"),
-    "dtw": (lambda curve, other: curves.dynamic_time_warping(curve, other).mean, "monotone, mean along the path"),
-    "dtw_sum": (lambda curve, other: curves.dynamic_time_warping(curve, other).cost, "monotone, sum along the path"),
-    "frechet": (curves.discrete_frechet, "discrete"),
-    "start_error": (curves.start_error, "jump between the given start and the first state"),
-    "end_point_error": (curves.end_point_error, "at the demonstration's own duration"),
-    "time_aligned_rmse": (curves.root_mean_square_error, "at equal times"),
+CURVE_SCORES = {
+    "dtwd_per_point": "Sec. 6.4, each direction divided by its number of points",
+    "dtwd_sum": "Sec. 6.4, summed over the points of both curves",
+    "dtw": "monotone, mean along the path",
+    "dtw_sum": "monotone, sum along the path",
+    "frechet": "discrete",
+    "start_error": "jump between the given start and the first state",
+    "end_point_error": "at the demonstration's own duration",
+    "time_aligned_rmse": "at equal times",
 }
+
+
+def curve_distances(rollout: curves.Curve, states: curves.Curve) -> dict[str, float]:
+    """Every distance of :data:`CURVE_SCORES` between a rollout and its demonstration [m]."""
+    alignment = curves.dynamic_time_warping(rollout, states)
+    return {
+        "dtwd_per_point": curves.dtwd_per_point(rollout, states),
+        "dtwd_sum": curves.dtwd_sum(rollout, states),
+        "dtw": alignment.mean,
+        "dtw_sum": alignment.sum,
+        "frechet": curves.discrete_frechet(rollout, states),
+        "start_error": curves.start_error(rollout, states),
+        "end_point_error": curves.end_point_error(rollout, states),
+        "time_aligned_rmse": curves.root_mean_square_error(rollout, states),
+    }
 
 
 def judge_reproduction(judged: Sequence[Judged], unit: Unit) -> Evaluation:
@@ -70,13 +85,18 @@ def judge_reproduction(judged: Sequence[Judged], unit: Unit) -> Evaluation:
 def _subset_scores(subset: str, judged: Sequence[Judged], unit: Unit) -> dict[str, Score]:
     lengths = sorted({len(one.time_s) for one in judged})
     points = f"{lengths[0]} points" if len(lengths) == 1 else f"{lengths[0]} to {lengths[-1]} points"
+    distances = [curve_distances(one.rollout, one.states) for one in judged]
     scores = {}
-    for name, (distance, meaning) in CURVE_SCORES.items():
-        values = [unit.per_state_unit * distance(one.rollout, one.states) for one in judged]
+    for name, meaning in CURVE_SCORES.items():
+        values = [unit.per_state_unit * single[name] for single in distances]
         scores[f"{subset}.{name}"] = mean_score(values, unit.name, f"{meaning}; {points} a curve, unscaled")
     predictions = [(one.predicted_velocities, one.velocities) for one in judged]
-    absolute = _pooled(curves.root_mean_square_error, predictions, f"{unit.name}/s", "on the demonstrated states")
-    scores[f"{subset}.velocity_rmse"] = _rescaled(absolute, unit.per_state_unit)
+    scores[f"{subset}.velocity_rmse"] = _pooled(
+        curves.root_mean_square_error,
+        [(unit.per_state_unit * predicted, unit.per_state_unit * recorded) for predicted, recorded in predictions],
+        f"{unit.name}/s",
+        "on the demonstrated states",
+    )
     scores[f"{subset}.relative_velocity_error"] = _pooled(
         curves.relative_error, predictions, "1", "sqrt(mean|v - v'|^2 / mean|v|^2) on the demonstrated states"
     )
@@ -145,18 +165,13 @@ def _nearest_velocities(judged: Judged, known: Sequence[Judged]) -> curves.Curve
 
 def _pooled(
     error: Callable[[curves.Curve, curves.Curve], float],
-    pairs: Sequence[tuple[curves.Curve, curves.Curve]],
+    pairs: Sequence[tuple[curves.AnyCurve, curves.AnyCurve]],
     unit: str,
     note: str,
 ) -> Score:
     """An error over the points of all demonstrations; spread and values are those of single demonstrations."""
     predicted, recorded = (np.concatenate(arrays) for arrays in zip(*pairs, strict=True))
     return summary_score(error(predicted, recorded), [error(*pair) for pair in pairs], unit, "pooled", note)
-
-
-def _rescaled(score: Score, factor: float) -> Score:
-    values = [factor * value for value in score.values]
-    return summary_score(factor * score.value, values, score.unit, score.statistic, score.note)
 
 
 def _arrays(judged: Sequence[Judged]) -> dict[str, np.ndarray]:

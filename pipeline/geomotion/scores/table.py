@@ -37,10 +37,10 @@ def scores_table(document: Mapping[str, Any]) -> str:
 
 def _row(name: str, score: Mapping[str, Any], width: int) -> str:
     value = _number(score["value"])
-    spread = f"± {_number(score['spread'])}" if score["count"] > 1 and score["spread"] != 0 else ""
+    spread = f"± {_number(score['spread'])}" if score["spread"] else ""
     unit = "" if score["unit"] == "1" else score["unit"]
     statistic = "" if score["statistic"] in {"mean", "share"} else score["statistic"]
-    return f"  {name:<{width}}  {value:>9} {spread:<10} {unit:<5}  n={score['count']:<5} {statistic}".rstrip()
+    return f"  {name:<{width}}  {value:>10} {spread:<11} {unit:<5}  n={score['count']:<5} {statistic}".rstrip()
 
 
 def _number(value: float | None) -> str:

@@ -8,12 +8,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from geomotion.config import GmsConfig, NcdsConfig
+import torch
+
+from geomotion.config import DatasetConfig, GmsConfig, NcdsConfig
 from geomotion.errors import InvalidSetting, MissingRun
 from geomotion.files import read_json
 from geomotion.interrupts import interrupts_as_errors
 from geomotion.stages import compare, regression
 from geomotion.stages.evaluate import EvaluateConfig, evaluate, scores_table
+from geomotion.stages.export import ExportConfig, export
 from geomotion.stages.ingest import ingest, summary_table
 from geomotion.stages.report import ReportConfig, report
 from geomotion.stages.rollout import RolloutStageConfig, rollout, rollout_table
@@ -50,6 +53,7 @@ def run_verb(verb: str, config: GmsConfig, overrides: list[str]) -> VerbResult:
     """
     program = "ncds" if isinstance(config, NcdsConfig) else "gms"
     _log_to_standard_error()
+    torch.set_num_threads(1)  # the networks are small: a second thread costs up to twenty times what it gives
     if verb == "ui":
         return _ui(config)
     with interrupts_as_errors(), _session(f"{program} {verb}", config, overrides) as session:
@@ -130,9 +134,8 @@ class Step:
 def _train_config(config: NcdsConfig) -> TrainConfig:
     dataset = config.dataset
     return TrainConfig(
-        state_channels=dataset.state_channels,
-        train_demos=dataset.train_demos,
-        test_demos=dataset.test_demos,
+        # the base class: where recordings come from must not decide whether a training is repeated
+        selection=DatasetConfig(dataset.name, dataset.state_channels, dataset.train_demos, dataset.test_demos),
         model=ModelConfig(config.chart, config.field, config.regulariser, config.seed),
         training=config.training,
         seed=config.seed,
@@ -148,7 +151,10 @@ STEPS: dict[str, Step] = {
     "evaluate": Step(
         Stage("evaluate", evaluate), ("ingest", "train"), lambda config: EvaluateConfig(config.evaluation, config.solver)
     ),
-    "report": Step(Stage("report", report), ("ingest", "train", "rollout", "evaluate"), lambda config: ReportConfig()),
+    "export": Step(Stage("export", export), ("train",), lambda config: ExportConfig(config.tracking.register_as)),
+    "report": Step(
+        Stage("report", report), ("ingest", "train", "rollout", "evaluate", "export"), lambda config: ReportConfig()
+    ),
 }
 
 

@@ -1,5 +1,6 @@
 """Judge a trained field: scores, the arrays behind them, pictures, and the measured side of its certificate."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,7 +24,10 @@ from geomotion.scores.grids import Box, bounding_box, sample_box
 from geomotion.scores.nearby import judge_nearby, nearby_starts
 from geomotion.scores.reproduction import Judged, judge_reproduction
 from geomotion.scores.support import RegionProtocol, judge_region
+from geomotion.scores.table import scores_table
 from geomotion.tracking import Artefacts, StageRun
+
+__all__ = ["EvaluateConfig", "compute", "evaluate", "scores_table"]
 
 PEERS_TRIM_POINTS = 15
 PEERS_TRAIN_DEMOS = (0, 1, 2, 3, 4)
@@ -37,12 +41,10 @@ class EvaluateConfig:
     Attributes:
         evaluation: Protocol and grids.
         solver: How rollouts are computed.
-        trim_start_points: Points that ingest dropped from each start, which the peers' protocol prescribes.
     """
 
     evaluation: EvaluationConfig
     solver: SolverConfig
-    trim_start_points: int
 
 
 def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
@@ -52,10 +54,10 @@ def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: Stage
         InvalidSetting: If the peers' protocol is asked for on other data than theirs.
     """
     skill = models.load(inputs["train"].path("model.pt"))
-    if config.evaluation.protocol is Protocol.peers:
-        require_peers_data(skill.train_demos, config.trim_start_points)
-    certificate = read_json(inputs["train"].path("certificate.json"))
     demonstrations = storage.load(inputs["ingest"].folder)
+    if config.evaluation.protocol is Protocol.peers:
+        require_peers_data(skill.train_demos, demonstrations.steps)
+    certificate = read_json(inputs["train"].path("certificate.json"))
 
     evaluation = compute(skill, demonstrations, certificate["rate_per_s"], config.evaluation, config.solver)
 
@@ -68,18 +70,23 @@ def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: Stage
     save_all(evaluation.arrays, certificate, run.folder / "figures")
 
 
-def require_peers_data(train_demos: tuple[int, ...], trim_start_points: int) -> None:
+def require_peers_data(train_demos: Sequence[int], steps: Sequence[str]) -> None:
     """Check that scores can stand beside those that peers publish.
 
+    Args:
+        train_demos: Numbers of the demonstrations that the model was fitted to.
+        steps: Preprocessing steps as they are recorded with the data.
+
     Raises:
-        InvalidSetting: If the model was not fitted to demonstrations 0-4, or 15 points were not trimmed.
+        InvalidSetting: If these are not demonstrations 0-4, or 15 points were not trimmed.
     """
-    if train_demos != PEERS_TRAIN_DEMOS or trim_start_points != PEERS_TRIM_POINTS:
+    trimmed = any(step.startswith(f"trimmed {PEERS_TRIM_POINTS} points at the start") for step in steps)
+    if not trimmed or tuple(train_demos) != PEERS_TRAIN_DEMOS:
         raise InvalidSetting(
             "evaluation",
             "peers",
             f"a model trained with dataset.train_demos={list(PEERS_TRAIN_DEMOS)} and dataset.preprocess."
-            f"trim_start_points={PEERS_TRIM_POINTS}; this one has {list(train_demos)} and {trim_start_points}",
+            f"trim_start_points={PEERS_TRIM_POINTS}; found train_demos={list(train_demos)} and the steps {list(steps)}",
         )
 
 
@@ -217,4 +224,4 @@ def _picture(field: ArrayField, scene: Scene) -> Evaluation:
 
 
 def _starts_per_axis(settings: EvaluationConfig) -> int:
-    return max(2, round(settings.region_starts**0.5))
+    return max(2, round(math.sqrt(settings.region_starts)))

@@ -8,7 +8,7 @@ import pandas as pd
 from geomotion import config as schema
 from geomotion import models
 from geomotion.demos import storage
-from geomotion.demos.split import split
+from geomotion.demos.selection import check_state_channels, split
 from geomotion.dynamics.certificate import certify
 from geomotion.errors import InvalidSetting
 from geomotion.figures.training import save_training_figure
@@ -16,8 +16,9 @@ from geomotion.files import atomic, write_json
 from geomotion.models import ModelConfig, Skill
 from geomotion.tracking import Artefacts, StageRun
 from geomotion.training.data import Geometry, TrainingSet
-from geomotion.training.objectives import TrajectoryReproduction, VelocityReconstruction
+from geomotion.training.objectives import VelocityReconstruction
 from geomotion.training.trainer import Objective, Schedule, fit
+from geomotion.training.trajectories import TrajectoryReproduction
 
 
 @dataclass(frozen=True)
@@ -25,32 +26,30 @@ class TrainConfig:
     """What the train stage needs.
 
     Attributes:
-        state_channels: Channels of the demonstrations that make up the state.
-        train_demos: Numbers of the demonstrations to fit; None for the default split.
-        test_demos: Numbers of the held-out ones; None for the rest.
+        selection: Demonstrations to fit and to hold out, and the channels that make up the state.
         model: Architecture.
         training: Objective and schedule.
         seed: Seed of the optimisation.
     """
 
-    state_channels: list[str]
-    train_demos: list[int] | None
-    test_demos: list[int] | None
+    selection: schema.DatasetConfig
     model: ModelConfig
     training: schema.TrainingConfig
     seed: int
 
 
 def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
-    """Write ``model.pt``, ``policy.onnx``, ``certificate.json``, ``training.csv`` and its picture."""
+    """Write ``model.pt``, ``certificate.json``, ``training.csv`` and its picture."""
     demonstrations = storage.load(inputs["ingest"].folder)
-    train_demos, test_demos = split(config.train_demos, config.test_demos, demonstrations)
-    data = TrainingSet.from_demonstrations(demonstrations.select(train_demos), config.state_channels)
+    check_state_channels(config.selection, demonstrations)
+    train_demos, test_demos = split(config.selection, demonstrations)
+    channels = tuple(config.selection.state_channels)
+    data = TrainingSet.from_demonstrations(demonstrations.select(train_demos), channels)
     geometry = Geometry.of(data)
     field = models.build(config.model, geometry)
     history = fit(field, _objective(config, data, geometry), _schedule(config), run.checkpoint, run.log_series)
 
-    skill = Skill(field, config.model, geometry, tuple(config.state_channels), tuple(train_demos), tuple(test_demos))
+    skill = Skill(field, config.model, geometry, channels, train_demos, test_demos)
     models.save(run.folder / "model.pt", skill)
     write_json(run.folder / "certificate.json", certify(field, data.all_states).as_dict())
     curves = pd.DataFrame(history.rows)
@@ -76,6 +75,7 @@ def _schedule(config: TrainConfig) -> Schedule:
     return Schedule(
         training.steps,
         training.learning_rate,
+        training.ramp_steps,
         training.gradient_clip,
         training.checkpoint_every_steps,
         training.log_every_steps,

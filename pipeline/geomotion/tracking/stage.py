@@ -1,6 +1,7 @@
 """What a stage is, and the handle through which it writes files and logs numbers."""
 
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,6 +59,26 @@ class StageRun:
 
         entity = Dataset(name=name, digest=digest[:36], source_type="code", source=source)
         self._client.log_inputs(self.run_id, [DatasetInput(entity, [InputTag("mlflow.data.context", "training")])])
+
+    def log_policy(self, path: Path, dim: int, register_as: str | None) -> None:
+        """Log an exported field as an MLflow model, and register it if it has a name."""
+        import mlflow
+        import numpy as np
+        from mlflow.models import ModelSignature
+        from mlflow.types import Schema, TensorSpec
+
+        tensors = Schema([TensorSpec(np.dtype(np.float32), (-1, dim))])
+        with mlflow.start_run(run_id=self.run_id), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            mlflow.pyfunc.log_model(
+                name="policy",
+                python_model=str(Path(__file__).parents[1] / "policy_model.py"),
+                artifacts={"policy": str(path)},
+                signature=ModelSignature(tensors, tensors),
+                pip_requirements=["onnxruntime", "numpy", "mlflow"],
+                registered_model_name=register_as,
+            )
+        self._client.update_run(self.run_id, status="RUNNING")
 
 
 StageFunction = Callable[[Any, Mapping[str, Artefacts], StageRun], None]

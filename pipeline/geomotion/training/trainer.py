@@ -39,7 +39,8 @@ class Schedule:
 
     Attributes:
         steps: Optimiser steps.
-        learning_rate: Of Adam, at the start; falls to zero along a cosine.
+        learning_rate: Of Adam, at its highest; falls to zero along a cosine.
+        ramp_steps: Steps over which it rises.
         gradient_clip: Largest norm of the gradient.
         checkpoint_every_steps: Steps between checkpoints.
         log_every_steps: Steps between logged losses.
@@ -48,10 +49,16 @@ class Schedule:
 
     steps: int
     learning_rate: float
+    ramp_steps: int
     gradient_clip: float
     checkpoint_every_steps: int
     log_every_steps: int
     seed: int
+
+    def learning_rate_at(self, step: int) -> float:
+        """Rate of one step, a function of nothing else, so that a resumed training has no state to restore."""
+        ramp = min(1.0, (step + 1) / self.ramp_steps)
+        return self.learning_rate * ramp * (1 + math.cos(math.pi * step / self.steps)) / 2
 
 
 @dataclass
@@ -72,7 +79,7 @@ def fit(model: nn.Module, objective: Objective, schedule: Schedule, checkpoint: 
         Interrupted: If a signal arrived.
         CorruptArtefact: If the checkpoint cannot be read.
     """
-    optimiser = torch.optim.Adam(model.parameters(), schedule.learning_rate)
+    optimiser = torch.optim.Adam(model.parameters(), schedule.learning_rate, fused=True)
     start, history = _restore(checkpoint, model, optimiser)
     model.train()
     with postponed_interrupts() as pending:
@@ -90,7 +97,7 @@ def _step(
 ) -> Losses:
     progress = step / schedule.steps
     for group in optimiser.param_groups:
-        group["lr"] = schedule.learning_rate * (1 + math.cos(math.pi * progress)) / 2
+        group["lr"] = schedule.learning_rate_at(step)
     losses = objective(model, progress, torch.Generator().manual_seed(schedule.seed * 1_000_003 + step))
     total = torch.stack(list(losses.values())).sum()
     if not torch.isfinite(total):

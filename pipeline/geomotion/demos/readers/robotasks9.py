@@ -21,7 +21,6 @@ SHA256 = {
     "wineglass": "ad56e3607934bded85dc57c241bd50aba80fc66809cb6e5e54a09950a397ab92",
 }
 DOWNLOAD_TIMEOUT_S = 10.0
-UNIT_NORM_TOLERANCE = 1e-6
 SOURCE = (
     "RoboTasks9: S. Auddy, J. Hollenstein, M. Saveriano, A. Rodriguez-Sanchez, J. Piater, Scalable and Efficient "
     "Continual Learning from Demonstration via a Hypernetwork-generated Stable Dynamics Model, arXiv 2311.03600"
@@ -43,11 +42,6 @@ def read(config: RoboTasks9Dataset) -> Demonstrations:
         for pose in poses
     )
     validate(str(path), trajectories)
-    norms = np.linalg.norm(poses[..., 3:], axis=-1)
-    if np.abs(norms - 1).max() > UNIT_NORM_TOLERANCE:
-        demo, row = np.unravel_index(np.abs(norms - 1).argmax(), norms.shape)
-        reason = f"demonstration {demo}, row {row}: quaternion of norm {norms[demo, row]:g}; expected 1"
-        raise DatasetError(path, reason)
     return Demonstrations(
         name=config.name,
         trajectories=trajectories,

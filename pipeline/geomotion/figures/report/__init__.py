@@ -1,0 +1,1 @@
+"""The report of a run: one HTML page that needs nothing else, for people who were not there."""

@@ -1,0 +1,94 @@
+"""The pictures of a run, inlined, with captions that say what to look for; and why others are missing."""
+
+from base64 import b64encode
+from dataclasses import dataclass
+from pathlib import Path
+
+from geomotion.figures.arrays import EvaluationArrays
+from geomotion.figures.style import PNG_DPI
+
+SCREEN_DPI = 130  # a little larger than in print
+PNG_WIDTH = slice(16, 20)  # where the header of a PNG says it
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An image that the page carries in itself.
+
+    Attributes:
+        title: What it shows.
+        caption: What to look for.
+        source: PNG as a data URI.
+        width: Width on the screen [px]; the same scale for all, so that their letters have one size.
+    """
+
+    title: str
+    caption: str
+    source: str
+    width: int
+
+
+CAPTIONS = {
+    "demonstrations": (
+        "Demonstrations",
+        "What was recorded, after preprocessing: all that the model has seen of the task.",
+    ),
+    "motion": (
+        "Learned motion",
+        "Orange should lie on black: each rollout starts where its demonstration starts and is never corrected. Dotted "
+        "and dashed curves were kept from training. Green and grey, where present, show what happens elsewhere.",
+    ),
+    "eigenvalues": (
+        "Where the field contracts",
+        "Blue: nearby motions approach each other at once. Red, outlined and hatched in maps: they part at first. The "
+        "panels share one colour scale, cut at the 95th percentile. Only the true Jacobian describes the motion.",
+    ),
+    "nearby": (
+        "Nearby motions",
+        "Do they come together? Below 1 they are closer than at the start. The solid curve has to stay under the dashed "
+        "bound where one is proven; the Euclidean curve may rise above 1 first.",
+    ),
+    "region": (
+        "Time inside the demonstration region",
+        "Rollouts from an equidistant grid, strong where they are inside the convex hull of the demonstrations, "
+        "Eq. (6.10). Bars far to the right mean that motions enter soon and stay.",
+    ),
+    "goal_starts": (
+        "Starts that never reach the goal",
+        "From crosses, the motion stops elsewhere, circles, diverges, or is too slow for the time allowed.",
+    ),
+    "training": (
+        "Training",
+        "The total should have levelled off; if it still falls at the end, more steps would help.",
+    ),
+}
+
+
+def pictures(folders: tuple[Path, ...]) -> dict[str, Picture]:
+    """The known pictures that lie in the figure folders, by name, in the order of the page."""
+    found = {}
+    for name, (title, caption) in CAPTIONS.items():
+        path = next((folder / f"{name}.png" for folder in folders if (folder / f"{name}.png").is_file()), None)
+        if path is not None:
+            png = path.read_bytes()
+            width = int.from_bytes(png[PNG_WIDTH], "big")
+            source = f"data:image/png;base64,{b64encode(png).decode()}"
+            found[name] = Picture(title, caption, source, round(width * SCREEN_DPI / PNG_DPI))
+    return found
+
+
+def missing(present: dict[str, Picture], data: EvaluationArrays) -> dict[str, str]:
+    """Why pictures or parts of them are not on the page, by title."""
+    reasons = {}
+    if data.dim != 2:
+        reasons["Vector field, eigenvalue map, region"] = (
+            f"they are drawn in a plane; the state has {data.dim} dimensions"
+        )
+    if data.eigenvalues is not None and data.eigenvalues.jhat is None:
+        reasons["Eigenvalues of Ĵ"] = "only a line-integral field has a matrix Ĵ, Eq. (5.1)"
+    if not data.has_held_out:
+        reasons["Held-out demonstrations"] = "none were judged"
+    if data.goal_starts is not None and data.goal_starts.reached.all():
+        reasons[CAPTIONS["goal_starts"][0]] = f"all {len(data.goal_starts.reached)} starts reach it"
+    absent = [name for name in ("demonstrations", "motion", "training") if name not in present]
+    return reasons | {CAPTIONS[name][0]: "its stage left no picture" for name in absent}

@@ -1,0 +1,20 @@
+"""The exported field as an MLflow model; logged as code, so that loading needs onnxruntime and nothing of ours."""
+
+import mlflow
+import numpy as np
+import onnxruntime
+
+
+class Policy(mlflow.pyfunc.PythonModel):
+    """States (batch, D) [m] to velocities [m/s]."""
+
+    def load_context(self, context):  # type: ignore[no-untyped-def]
+        """Open the ONNX file."""
+        self.session = onnxruntime.InferenceSession(context.artifacts["policy"], providers=["CPUExecutionProvider"])
+
+    def predict(self, context, model_input, params=None):  # type: ignore[no-untyped-def]
+        """Velocities at states."""
+        return self.session.run(None, {"state_m": np.asarray(model_input, dtype=np.float32)})[0]
+
+
+mlflow.models.set_model(Policy())

@@ -1,0 +1,135 @@
+"""Write the report of a run: one HTML page made of what the other stages left."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+from omegaconf import OmegaConf
+
+from geomotion.errors import CorruptArtefact
+from geomotion.figures.arrays import EvaluationArrays, read_evaluation
+from geomotion.figures.report.caveats import caveats
+from geomotion.figures.report.page import Page, render
+from geomotion.figures.report.pictures import missing, pictures
+from geomotion.figures.report.scores import headlines, tables
+from geomotion.figures.report.verdict import verdict
+from geomotion.files import read_json, write_text
+from geomotion.tracking import Artefacts, StageRun
+
+Document = Mapping[str, Any]
+STAGES = ("ingest", "train", "rollout", "evaluate", "export")
+
+
+@dataclass(frozen=True)
+class ReportConfig:
+    """What the report stage needs beyond the artefacts of the others.
+
+    Attributes:
+        title: Heading; None for one made of the dataset's name.
+        command: Command line that repeats the run; empty if it is not known.
+    """
+
+    title: str | None = None
+    command: str = ""
+
+
+def report(config: ReportConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
+    """Write ``report.html``.
+
+    Args:
+        config: Title and command.
+        inputs: Stages ``ingest``, ``train``, ``evaluate``, and ``rollout`` and ``export`` if there were any.
+        run: Where to write.
+
+    Raises:
+        MissingArtefact: If a stage did not leave what its contract says.
+        CorruptArtefact: If a file cannot be read.
+    """
+    write_text(run.folder / "report.html", render(compose(config, inputs)))
+
+
+def compose(config: ReportConfig, inputs: Mapping[str, Artefacts]) -> Page:
+    """Read what the stages left and say what is in it."""
+    summary: Document = read_json(inputs["ingest"].path("summary.json"))
+    certificate: Document = read_json(inputs["evaluate"].path("certificate.json"))
+    judged: Document = read_json(inputs["evaluate"].path("scores.json"))
+    rollouts: Document = read_json(inputs["rollout"].path("rollouts.json")) if "rollout" in inputs else {}
+    data = read_evaluation(inputs["evaluate"].path("evaluation.npz"))
+    present = {name: inputs[name] for name in STAGES if name in inputs}
+    configurations = {name: _recorded(stage, "config.json") for name, stage in present.items()}
+    shown = pictures(tuple(inputs[name].folder / "figures" for name in ("ingest", "train", "evaluate")))
+    facts = (
+        _facts(summary, data, judged, configurations["train"])
+        | _training_facts(inputs["train"])
+        | _policy_facts(inputs)
+    )
+    return Page(
+        title=config.title or f"Motion learned from {judged['dataset']}",
+        facts=facts,
+        verdict=verdict(certificate, data.eigenvalues),
+        headlines=headlines(judged["scores"]),
+        tables=tables(judged["scores"]),
+        pictures=shown,
+        demonstrations=list(summary.get("demos", [])),
+        rollouts=list(rollouts.get("rollouts", [])),
+        steps=list(summary.get("steps", [])),
+        source=summary.get("source") or "not stated",
+        licence=summary.get("licence") or "not stated",
+        caveats=caveats(data, str(certificate.get("claim")), str(judged["protocol"])),
+        omitted=missing(shown, data) | _omitted(judged, inputs),
+        command=config.command,
+        configurations={name: _yaml(found) for name, found in configurations.items() if found},
+        versions=_recorded(inputs["evaluate"], "environment.json"),
+        runs={name: (stage.run_id, stage.digest) for name, stage in present.items()},
+    )
+
+
+def _facts(summary: Document, data: EvaluationArrays, judged: Document, training: Document) -> dict[str, str]:
+    demos = summary.get("demos", [])
+    sets = [demo["set"] for demo in demos]
+    durations = [demo["duration_s"] for demo in demos] or [item.time_s[-1] - item.time_s[0] for item in data.judged]
+    model = training.get("model", {})
+    kinds = {part: str(model.get(part, {}).get("kind", "not recorded")) for part in ("field", "chart")}
+    return {
+        "Dataset": str(judged["dataset"]),
+        "State": f"{data.dim} dimensions; space {summary.get('space')}, frame {summary.get('frame')}",
+        "Demonstrations": f"{len(demos)}: {sets.count('train')} for training, {sets.count('test')} held out",
+        "Duration": f"{min(durations):.2f} to {max(durations):.2f} s, mean {sum(durations) / len(durations):.2f} s",
+        "Model": f"{kinds['field']} in {kinds['chart']}",
+        "Protocol": str(judged["protocol"]),
+        "Seed": str(training.get("seed", "not recorded")),
+    }
+
+
+def _training_facts(train: Artefacts) -> dict[str, str]:
+    path = train.path("training.csv")
+    try:
+        last = pd.read_csv(path).iloc[-1]
+        return {"Training": f"{int(last['step'])} steps, final loss {float(last['total']):.3g}"}
+    except (ValueError, KeyError, IndexError) as error:
+        raise CorruptArtefact(path, f"not a table with columns step and total ({error})") from error
+
+
+def _policy_facts(inputs: Mapping[str, Artefacts]) -> dict[str, str]:
+    if "export" not in inputs:
+        return {}
+    policy: Document = read_json(inputs["export"].path("policy.json"))
+    differs = f"at most {policy['max_difference_to_torch_m_per_s']:.1g} m/s from the trained one"
+    return {"Exported policy": f"ONNX, {policy['query_time_ms']:.2g} ms for one velocity, {differs}"}
+
+
+def _recorded(stage: Artefacts, name: str) -> dict[str, Any]:
+    """What the tracker recorded beside the outputs of a stage; empty where it did not."""
+    path = stage.folder / name
+    return dict(read_json(path)) if path.is_file() else {}
+
+
+def _yaml(configuration: Document) -> str:
+    return OmegaConf.to_yaml(OmegaConf.create(dict(configuration)))
+
+
+def _omitted(judged: Document, inputs: Mapping[str, Artefacts]) -> dict[str, str]:
+    """Scores and stages that are not there, and why."""
+    reasons = {f"Score {name}": str(reason) for name, reason in judged.get("omitted", {}).items()}
+    return reasons if "rollout" in inputs else reasons | {"Rollouts": "the rollout stage was not run"}

@@ -1,0 +1,169 @@
+"""Fitting whole trajectories of a field that is solvable in closed form: no solver, no unrolling."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from geomotion.config import TrajectoryTraining
+from geomotion.dynamics.charts import AnchoredChart
+from geomotion.dynamics.fields import ChartedField, SolvableField
+from geomotion.training.data import Geometry, TrainingSet
+from geomotion.training.trainer import Losses
+from geomotion.types import Float, Int, Tensor
+
+ROUNDING = 1e-6  # keeps the root of a squared distance differentiable at 0
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Trajectories with the same number of points; lengths in scaled units, times in mean durations."""
+
+    times: Float[Tensor, "demo point"]
+    states: Float[Tensor, "demo point D"]
+
+    def at(self, index: Int[Tensor, "demo *chosen"]) -> tuple[Tensor, Tensor]:
+        """Times and states of chosen points of each demonstration."""
+        row = torch.arange(len(index)).view(-1, *(1,) * (index.ndim - 1))
+        return self.times[row, index], self.states[row, index]
+
+
+class TrajectoryReproduction:
+    """Distance between demonstrations and trajectories from their own states, at equal times and as curves.
+
+    Each step draws starts on the demonstrations, the first of them their beginnings, and times after each. Half of the
+    starts lie on mixtures of two demonstrations, x_i + λ (x_j - x_i), which stand for the repetitions that a person did
+    not show: without them the field learns the starts of the training set by heart. After a warm-up, the nearest-point
+    term compares whole curves, which lets the shape count more than the timing.
+
+    Args:
+        data: Demonstrations.
+        geometry: Their size and duration.
+        settings: Weights and sample sizes.
+    """
+
+    def __init__(self, data: TrainingSet, geometry: Geometry, settings: TrajectoryTraining) -> None:
+        self.settings = settings
+        self.scale_m = geometry.scale_m
+        self.duration_s = geometry.duration_s
+        self.centre = torch.tensor(geometry.centre)
+        self.curves = self._common_length(data)
+        self.states = data.all_states
+        self.velocities = data.all_velocities
+        self.mean_square_speed = self.velocities.square().sum(-1).mean()
+
+    def __call__(self, model: ChartedField, progress: float, generator: torch.Generator) -> Losses:
+        settings = self.settings
+        curve_term = progress >= settings.warm_up
+        mixed = self._mix(generator)
+        chosen = torch.randint(len(self.states), (settings.velocity_points,), generator=generator)
+        starts, elapsed, targets = self._samples(mixed, generator)
+        followed, first = self._followed(mixed, generator)
+        curve_times = self._curve_times(followed, generator)
+
+        # one pass through ψ for velocities, starts and goal, one through its inverse for all trajectories
+        chart, field = model.chart, model.field
+        assert isinstance(chart, AnchoredChart) and isinstance(field, SolvableField)
+        queried = torch.cat([self.states[chosen], self._to_metres(starts).flatten(0, 1), chart.anchor[None]])
+        z, push_forward = chart.chart.linearise(queried)
+        image = z[-1]
+        velocity = push_forward(field(z - image))[: len(chosen)] / model.time_unit_s
+        latent_starts = (z[len(chosen) : -1] - image).view(starts.shape)
+        paths = [field.solve(latent_starts, elapsed).flatten(0, 2)]
+        if curve_term:
+            paths.append(field.solve(latent_starts[:, first], curve_times).flatten(0, 1))
+        x = self._from_metres(chart.chart.to_ambient(torch.cat(paths) + image))
+
+        error = (velocity - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
+        equal_time = (x[: len(paths[0])].view(targets.shape) - targets).square().sum(-1).mean()
+        losses = {"velocity": settings.velocity_weight * error}
+        if not curve_term:
+            return losses | {"equal_time": settings.equal_time_warm_up_weight * equal_time}
+        curve = x[len(paths[0]) :].view(*curve_times.shape, -1)
+        phase = int(torch.randint(settings.curve_stride, (), generator=generator))
+        return losses | {
+            "equal_time": settings.equal_time_weight * equal_time,
+            "nearest_point": self._nearest_point(curve, followed.states[:, phase :: settings.curve_stride]),
+        }
+
+    def _common_length(self, data: TrainingSet) -> Curves:
+        """Demonstrations on as many points as the longest has, by linear interpolation between neighbours."""
+        count = max(len(times) for times in data.times)
+        times, states = [], []
+        for own_times, own_states in zip(data.times, data.states, strict=True):
+            position, own = np.linspace(0, len(own_times) - 1, count), np.arange(len(own_times))
+            times.append(np.interp(position, own, own_times.numpy()))
+            states.append(np.stack([np.interp(position, own, column) for column in own_states.T.numpy()], -1))
+        scaled = self._from_metres(torch.tensor(np.stack(states), dtype=torch.float32))
+        return Curves(torch.tensor(np.stack(times) / self.duration_s, dtype=torch.float32), scaled)
+
+    def _from_metres(self, states: Tensor) -> Tensor:
+        return (states - self.centre) / self.scale_m
+
+    def _to_metres(self, states: Tensor) -> Tensor:
+        return states * self.scale_m + self.centre
+
+    def _mix(self, generator: torch.Generator) -> Curves:
+        """Each demonstration moved towards, or away from, another one."""
+        curves = self.curves
+        share = self.settings.mixing * (2 * torch.rand(len(curves.times), 1, generator=generator) - 1)
+        other = torch.randperm(len(curves.times), generator=generator)
+        return Curves(
+            curves.times + share * (curves.times[other] - curves.times),
+            curves.states + share[..., None] * (curves.states[other] - curves.states),
+        )
+
+    def _samples(self, mixed: Curves, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
+        """Starts (demo, start, D), times since each (demo, start, time), and where the demonstrations are then."""
+        demos, points, _ = self.curves.states.shape
+        starts, half = self.settings.starts, self.settings.starts // 2
+        begin = (torch.rand(demos, starts, generator=generator) * (points - 2)).long()
+        begin[:, [0, half]] = 0
+        share = torch.arange(self.settings.times) + torch.rand(demos, starts, self.settings.times, generator=generator)
+        rest = (points - 1 - begin)[..., None]
+        later = begin[..., None] + 1 + (share / self.settings.times * rest).long().clamp(max=points - 2)
+        later = later.clamp(max=points - 1)
+        parts = []
+        for curves, part in ((self.curves, slice(0, half)), (mixed, slice(half, None))):
+            start_times, start_states = curves.at(begin[:, part])
+            times, states = curves.at(later[:, part])
+            parts.append((start_states, times - start_times[..., None], states))
+        return tuple(torch.cat(pair, 1) for pair in zip(*parts, strict=True))  # type: ignore[return-value]
+
+    def _followed(self, mixed: Curves, generator: torch.Generator) -> tuple[Curves, int]:
+        """Curves for the nearest-point term, and which start begins them: mixtures in every second step, on average."""
+        if self.settings.mixing > 0 and float(torch.rand((), generator=generator)) < 0.5:
+            return mixed, self.settings.starts // 2
+        return self.curves, 0
+
+    def _curve_times(self, curves: Curves, generator: torch.Generator) -> Float[Tensor, "demo time"]:
+        demos, points = curves.times.shape
+        inner = self.settings.curve_points - 1
+        share = (torch.arange(inner) + torch.rand(demos, inner, generator=generator)) / inner
+        index = (torch.cat([torch.zeros(demos, 1), share], 1) * (points - 1)).round().long()
+        return curves.at(index)[0]
+
+    def _nearest_point(self, curve: Float[Tensor, "demo k D"], demonstration: Float[Tensor, "demo m D"]) -> Tensor:
+        with torch.no_grad():
+            distance = torch.cdist(curve, demonstration)
+            to_demonstration, to_curve = distance.argmin(2), distance.argmin(1)
+        there = squared_distance_to_curve(curve, demonstration, to_demonstration)
+        back = squared_distance_to_curve(demonstration, curve, to_curve)
+        mean = (there + ROUNDING).sqrt().mean() + (back + ROUNDING).sqrt().mean()
+        square = there.mean() + back.mean()
+        return self.settings.nearest_point_weight * square + self.settings.nearest_point_mean_weight * mean
+
+
+def squared_distance_to_curve(
+    points: Float[Tensor, "demo k D"], curve: Float[Tensor, "demo m D"], nearest: Int[Tensor, "demo k"]
+) -> Float[Tensor, "demo k"]:
+    """Squared distance to the two segments that meet at the nearest vertex of a polyline."""
+    row = torch.arange(len(curve))[:, None]
+    distances = []
+    for offset in (-1, 0):
+        begin = (nearest + offset).clamp(0, curve.shape[1] - 2)
+        origin, end = curve[row, begin], curve[row, begin + 1]
+        along = end - origin
+        share = ((points - origin) * along).sum(-1) / along.square().sum(-1).clamp_min(1e-9)
+        distances.append((origin + share.clamp(0, 1)[..., None] * along - points).square().sum(-1))
+    return torch.minimum(*distances)

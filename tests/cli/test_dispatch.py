@@ -1,0 +1,141 @@
+"""Finding the verb: help, version, hints, start-up time."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from geomotion_cli.verbs import PROGRAMS
+from hydra import compose, initialize_config_module
+from omegaconf import OmegaConf
+
+SCRIPTS = Path(sys.executable).parent
+HEAVY = ("hydra", "matplotlib", "mlflow", "numpy", "omegaconf", "pandas", "torch")
+
+
+def run(*words: str, **options) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(words, capture_output=True, text=True, check=False, **options)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_help_comes_within_three_tenths_of_a_second(program):
+    def measure() -> float:
+        start = time.perf_counter()
+        assert run(str(SCRIPTS / program), "--help").returncode == 0
+        return time.perf_counter() - start
+
+    assert min(measure() for _ in range(3)) < 0.3
+
+
+def test_help_imports_nothing_heavy():
+    script = "import sys; from geomotion_cli.dispatch import main; main('ncds', ['--help']); print(*sys.modules)"
+    modules = set(run(sys.executable, "-c", script).stdout.split())
+    assert "geomotion_cli.verbs" in modules
+    assert not modules.intersection(HEAVY)
+
+
+def test_help_of_a_verb_does_not_import_the_pipeline():
+    script = "import sys; from geomotion_cli.dispatch import main; main('ncds', ['train', '-h']); print(*sys.modules)"
+    modules = set(run(sys.executable, "-c", script).stdout.split())
+    assert "hydra" in modules
+    assert not modules.intersection({"matplotlib", "mlflow", "pandas", "torch"})
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_help_lists_every_verb_with_its_summary(command, program):
+    answer = command("--help", program=program)
+    assert answer.status == 0
+    for name, verb in PROGRAMS[program].verbs.items():
+        assert f"  {name} " in answer.out
+        assert verb.summary in answer.out
+
+
+def test_every_verb_that_is_offered_exists():
+    from geomotion.stages.commands import VERBS
+
+    offered = {verb for program in PROGRAMS.values() for verb in program.verbs}
+    assert offered == set(VERBS) | {"ui"}
+
+
+def test_without_a_verb_help_goes_to_standard_error(command):
+    answer = command()
+    assert (answer.status, answer.out) == (2, "")
+    assert "Verbs:" in answer.err
+
+
+@pytest.mark.parametrize("arguments", [("train", "--help"), ("help", "train"), ("train", "seed=1", "-h")])
+def test_help_of_a_verb_shows_usage_settings_choices_flags_and_examples(command, arguments):
+    answer = command(*arguments)
+    assert answer.status == 0
+    for part in ("Usage: ncds train", "training.steps=", "lasa/angle", "experiment = thesis/ncds", "--cfg job", "-m"):
+        assert part in answer.out
+    assert "_schema" not in answer.out
+
+
+def test_gms_offers_no_settings_of_fields(command):
+    assert "field" not in command("ingest", "--help", program="gms").out
+
+
+EXAMPLES = {
+    (name, example)
+    for program in PROGRAMS.values()
+    for name, verb in program.verbs.items()
+    for example in verb.examples
+}
+SETTINGS = {
+    (name, setting)
+    for name, program in PROGRAMS.items()
+    for verb in program.verbs.values()
+    for setting in verb.settings
+}
+
+
+@pytest.mark.parametrize(("verb", "example"), sorted(EXAMPLES))
+def test_every_example_of_the_help_is_accepted(command, verb, example):
+    assert command(verb, *example.split()).status == 0
+
+
+@pytest.mark.parametrize(("program", "setting"), sorted(SETTINGS))
+def test_every_setting_of_the_help_composes(program, setting):
+    with initialize_config_module(version_base="1.3", config_module="geomotion.conf"):
+        folder = ["dataset=folder"] if setting.startswith("dataset.root") else []
+        OmegaConf.to_object(compose(program, overrides=[*folder, setting]))
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"), [("trian", "train"), ("reports", "report"), ("evaluate", "eval"), ("chekc", "check")]
+)
+def test_an_unknown_verb_gets_a_hint(command, written, meant):
+    answer = command(written, "dataset=lasa/angle")
+    assert (answer.status, answer.out) == (2, "")
+    assert f"unknown verb '{written}'. Did you mean '{meant}'?" in answer.err
+    assert answer.err.count("\n") == 1
+
+
+def test_a_setting_before_the_verb_is_explained(command):
+    answer = command("seed=1", "train")
+    assert answer.status == 2
+    assert "comes before the verb" in answer.err
+
+
+@pytest.mark.parametrize("arguments", [("--version",), ("train", "--version")])
+def test_version(command, arguments):
+    from geomotion import __version__
+
+    assert command(*arguments).out == f"ncds {__version__}\n"
+
+
+def test_the_module_runs_like_the_script():
+    assert (
+        run(sys.executable, "-m", "geomotion_cli", "gms", "--help").stdout == run(str(SCRIPTS / "gms"), "--help").stdout
+    )
+    assert run(sys.executable, "-m", "geomotion_cli", "gsm").returncode == 1
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    late = "import sys, time; time.sleep(0.5); from geomotion_cli.dispatch import main; sys.exit(main('ncds', ['-h']))"
+    piped = run("bash", "-c", '"$0" -c "$1" | true; echo "${PIPESTATUS[0]}"', sys.executable, late)
+    assert piped.stdout.strip() == "141"
+    assert piped.stderr == ""

@@ -1,0 +1,92 @@
+"""Overrides: every offered choice composes, and every mistake gets one line that says what was meant."""
+
+import json
+
+import pytest
+from hydra import compose, initialize_config_module
+from omegaconf import OmegaConf
+
+from geomotion.config import GmsConfig, NcdsConfig
+from geomotion_cli.choices import group_options, top_level_names
+
+OPTIONS = [
+    f"{group}={option}" for group, options in group_options(*top_level_names(NcdsConfig)).items() for option in options
+]
+
+
+@pytest.fixture
+def configuration():
+    with initialize_config_module(version_base="1.3", config_module="geomotion.conf"):
+        yield
+
+
+@pytest.mark.parametrize("choice", OPTIONS)
+def test_every_choice_makes_a_typed_configuration(configuration, choice):
+    extra = ["dataset.root=recordings"] if choice == "dataset=folder" else []
+    config = OmegaConf.to_object(compose("ncds", overrides=[choice, *extra]))
+    assert type(config) is NcdsConfig
+
+
+@pytest.mark.parametrize("choice", [option for option in OPTIONS if option.startswith("dataset=lasa/a")])
+def test_gms_takes_the_same_recordings(configuration, choice):
+    assert type(OmegaConf.to_object(compose("gms", overrides=[choice]))) is GmsConfig
+
+
+def test_choices_include_sub_folders_and_no_internals():
+    assert {"dataset=lasa/angle", "dataset=folder", "experiment=thesis/ncds", "field=linear"} <= set(OPTIONS)
+    assert not [option for option in OPTIONS if option.endswith("_schema")]
+
+
+MISTAKES = {
+    "chart.layrs=3": "unknown setting 'chart.layrs'. Did you mean 'chart.layers'?",
+    "fild=linear": "unknown setting 'fild'. Did you mean 'field'?",
+    "experimnt=thesis/ncds": "unknown setting 'experimnt'. Did you mean 'experiment'?",
+    "learning_rate=0.1": "unknown setting 'learning_rate'. Did you mean 'training.learning_rate'?",
+    "dataset.preprocess.velocty=recorded": "Did you mean 'dataset.preprocess.velocity'?",
+    "+chart.layrs=3": "unknown setting 'chart.layrs'. Did you mean 'chart.layers'?",
+    "++colour=red": "unknown setting 'colour'.",
+    "dataset=lasa/angel": "unknown dataset 'lasa/angel'. Did you mean 'lasa/angle'?",
+    "dataset=lasas/angle": "Did you mean 'lasa/angle'?",
+    "field=liner": "unknown field 'liner'. Did you mean 'linear'? Available: line_integral, linear.",
+    "experiment=thesis/ncd": "unknown experiment 'thesis/ncd'. Did you mean 'thesis/ncds'?",
+    "hydra/launcher=bsic": "unknown hydra/launcher 'bsic'. Did you mean 'basic'?",
+    "chart.layers=many": "chart.layers: Value 'many' of type 'str' could not be converted to Integer",
+    "chart.layers=-1": "chart.layers=-1 is not valid: expected a number above 0.",
+    "output=xml": "output: Invalid value 'xml', expected one of [text, json]",
+    "seed=null": "seed: field 'seed' is not Optional",
+    "seed=1,2": "Ambiguous value for argument 'seed=1,2'",
+    "chart.layers": "cannot read 'chart.layers': missing EQUAL at '<EOF>'; settings are written key=value.",
+    "chart=[a": "cannot read 'chart=[a'",
+    "dataset=folder": "dataset.root has no value; set it with dataset.root=…",
+    "tracking.root=${nowhere}": "Interpolation key 'nowhere' not found",
+    "--debg": "unknown flag '--debg'. Did you mean '--debug'?",
+    "--cfg=nothing": "argument --cfg/-c: invalid choice: 'nothing'",
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_gets_one_helpful_line_and_status_two(command, mistake):
+    answer = command("train", mistake)
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.err.startswith("ncds train: error: ")
+    assert MISTAKES[mistake] in answer.err
+    assert answer.err.count("\n") == 1
+    assert "HYDRA_FULL_ERROR" not in answer.err
+
+
+@pytest.mark.parametrize("mistake", ["chart.layrs=3,4", "dataset=lasa/angel,lasa/sine"])
+def test_a_sweep_with_a_mistake_does_not_start(command, mistake):
+    answer = command("train", "-m", mistake)
+    assert (answer.status, answer.out) == (2, "")
+    assert "Did you mean" in answer.err
+    assert answer.err.count("\n") == 1
+
+
+def test_mistakes_are_documents_too(command):
+    answer = command("train", "chart.layrs=3", "output=json")
+    assert json.loads(answer.out)["error"]["type"] == "UsageError"
+    assert json.loads(command("trian", "output=json").out)["error"]["type"] == "UsageError"
+
+
+def test_debug_shows_where_a_mistake_was_found(command):
+    assert "Traceback" in command("train", "chart.layrs=3", "--debug").err

@@ -1,0 +1,46 @@
+import pytest
+from hydra import compose, initialize_config_module
+from omegaconf import OmegaConf
+
+from geomotion.config import LASA_SHAPES, LETTERS, ROBOTASKS9_TASKS
+from geomotion.demos.readers import read
+from geomotion.errors import UnknownName
+
+
+def dataset(choice, *overrides):
+    with initialize_config_module(version_base="1.3", config_module="geomotion.conf"):
+        return OmegaConf.to_object(compose("ncds", [f"dataset={choice}", *overrides]).dataset)
+
+
+@pytest.mark.parametrize("shape", LASA_SHAPES)
+def test_every_shape_has_a_choice_in_lower_case(shape):
+    assert dataset(f"lasa/{shape.lower()}").shapes == [shape]
+
+
+@pytest.mark.parametrize("task", ROBOTASKS9_TASKS)
+def test_every_task_has_a_choice(task):
+    assert dataset(f"robotasks9/{task}").task == task
+
+
+@pytest.mark.parametrize("letter", LETTERS)
+def test_every_letter_has_a_choice_and_can_be_read(letter):
+    demonstrations = read(dataset(f"letters/{letter}", "dataset.demos=2"))
+    assert demonstrations.name == f"letters/{letter}"
+
+
+@pytest.mark.parametrize(("choice", "count"), [("stacked_4d", 2), ("stacked_8d", 4)])
+def test_stacked_shapes_can_be_chosen_and_changed(choice, count):
+    assert len(dataset(f"lasa/{choice}").shapes) == count
+    assert dataset(f"lasa/{choice}", "dataset.shapes=[Line,Worm]").shapes == ["Line", "Worm"]
+
+
+def test_settings_of_a_choice_can_be_changed():
+    found = dataset(
+        "lasa/angle", "dataset.preprocess.trim_start_points=3", "dataset.train_demos=null", "dataset.root=/x"
+    )
+    assert (found.preprocess.trim_start_points, found.train_demos, found.root) == (3, None, "/x")
+
+
+def test_a_misspelt_shape_in_a_stack_is_met_with_the_closest_one():
+    with pytest.raises(UnknownName, match="Did you mean 'Sine'"):
+        dataset("lasa/stacked_4d", "dataset.shapes=[Angle,Sinee]")
