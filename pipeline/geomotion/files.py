@@ -1,12 +1,12 @@
 """Files that are either whole or absent: written beside their place and renamed."""
 
+import io
 import json
-import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from geomotion.errors import CorruptArtefact, DiskFull, MissingData, is_disk_full
 
@@ -21,9 +21,7 @@ def atomic(path: Path) -> Iterator[Path]:
         DiskFull: If space, quota or a size limit ran out.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
+    temporary = path.with_name(f".{path.stem}-{uuid4().hex}{path.suffix}")  # unlike mkstemp's, with usual permissions
     try:
         yield temporary
         temporary.replace(path)
@@ -39,6 +37,15 @@ def write_bytes(path: Path, data: bytes) -> None:
     """Write a whole file or none."""
     with atomic(path) as temporary:
         temporary.write_bytes(data)
+
+
+def write_tensors(path: Path, document: object) -> None:
+    """Write what `torch.save` takes; the same content gives the same bytes, which it does not where it knows the name."""
+    import torch
+
+    buffer = io.BytesIO()
+    torch.save(document, buffer)
+    write_bytes(path, buffer.getvalue())
 
 
 def write_text(path: Path, text: str) -> None:

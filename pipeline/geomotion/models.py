@@ -16,7 +16,7 @@ from geomotion.dynamics.linear import LinearField
 from geomotion.dynamics.quadrature import GaussLegendre
 from geomotion.dynamics.regularisers import ConstantRegulariser, Regulariser, StateIndependentRegulariser
 from geomotion.errors import CorruptArtefact, InvalidSetting
-from geomotion.files import atomic
+from geomotion.files import write_tensors
 from geomotion.networks.coupling import CouplingFlow
 from geomotion.networks.mlp import JacobianRoot
 from geomotion.training.data import Geometry
@@ -157,8 +157,7 @@ def save(path: Path, skill: Skill) -> None:
         "test_demos": list(skill.test_demos),
         "parameters": skill.field.state_dict(),
     }
-    with atomic(path) as temporary:
-        torch.save(document, temporary)
+    write_tensors(path, document)
 
 
 def load(path: Path) -> Skill:

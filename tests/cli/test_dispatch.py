@@ -6,10 +6,10 @@ import time
 from pathlib import Path
 
 import pytest
-
-from geomotion_cli.verbs import PROGRAMS
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
+
+from geomotion_cli.verbs import PROGRAMS
 
 SCRIPTS = Path(sys.executable).parent
 HEAVY = ("hydra", "matplotlib", "mlflow", "numpy", "omegaconf", "pandas", "torch")

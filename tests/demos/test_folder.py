@@ -76,7 +76,10 @@ def test_numbered_axes_are_sorted_by_number(tmp_path):
 
 
 def test_joints_keep_the_order_of_the_file(tmp_path):
-    csv(tmp_path, time_s=TIME, joint_shoulder_rad=TIME, joint_elbow_rad=-TIME, joint_shoulder_rad_per_s=TIME**0, joint_elbow_rad_per_s=-(TIME**0))  # fmt: skip
+    one = np.ones(11)
+    positions = {"joint_shoulder_rad": TIME, "joint_elbow_rad": -TIME}
+    velocities = {"joint_shoulder_rad_per_s": one, "joint_elbow_rad_per_s": -one}
+    csv(tmp_path, time_s=TIME, **positions, **velocities)
     demonstrations = read(config(tmp_path))
     np.testing.assert_array_equal(demonstrations[0].channels["joints_rad"], np.stack([TIME, -TIME], axis=1))
     np.testing.assert_array_equal(demonstrations[0].velocity(["joints_rad"])[0], [1, -1])
@@ -84,8 +87,8 @@ def test_joints_keep_the_order_of_the_file(tmp_path):
 
 
 def test_poses_have_scalar_first_quaternions(tmp_path):
-    zeros = np.zeros(11)
-    csv(tmp_path, time_s=TIME, x=TIME, y=TIME, z=TIME, orientation_x=zeros, orientation_y=zeros, orientation_z=zeros, orientation_w=zeros + 1)  # fmt: skip
+    quaternion = {f"orientation_{axis}": np.full(11, float(axis == "w")) for axis in "xyzw"}
+    csv(tmp_path, time_s=TIME, x=TIME, y=TIME, z=TIME, **quaternion)
     demonstrations = read(config(tmp_path))
     assert demonstrations.space == "R3xS3"
     np.testing.assert_array_equal(demonstrations[0].channels["orientation_wxyz"][3], [1, 0, 0, 0])
@@ -99,9 +102,10 @@ def test_a_rate_stands_in_for_times(tmp_path):
 
 
 def test_npz_holds_one_demonstration_or_several(tmp_path):
+    two = np.stack([XY, 2 * XY])
     np.savez(tmp_path / "a.npz", time_s=TIME, position_m=XY, velocity_m_per_s=2 * XY)
-    np.savez(tmp_path / "b.npz", time_s=TIME, position_m=np.stack([XY, 2 * XY]), velocity_m_per_s=np.stack([XY, XY]))
-    np.savez(tmp_path / "c.npz", time_s=np.stack([TIME, 3 * TIME]), position_m=np.stack([XY, XY]), velocity_m_per_s=np.stack([XY, XY]))  # fmt: skip
+    np.savez(tmp_path / "b.npz", time_s=TIME, position_m=two, velocity_m_per_s=two)
+    np.savez(tmp_path / "c.npz", time_s=np.stack([TIME, 3 * TIME]), position_m=two, velocity_m_per_s=two)
     demonstrations = read(config(tmp_path))
     assert [trajectory.label for trajectory in demonstrations.trajectories] == ["a", "0", "1", "0", "1"]
     assert [trajectory.duration_s for trajectory in demonstrations.trajectories] == [1, 1, 1, 1, 3]
@@ -167,12 +171,18 @@ BAD_COLUMNS = {
     "a repeated time": (cells(5, "t", 0.4, "time_s"), r"row 5: time 0.4 s repeats 0.4 s"),
     "one point": ({"time_s": [0.0], "x": [1.0], "y": [1.0]}, r"has 1 point\(s\); expected at least 2"),
     "no rows": ({"time_s": [], "x": [], "y": []}, r"has 0 point\(s\)"),
-    "an unknown column": ({"time_s": TIME, "x": TIME, "y": TIME, "positon_m_z": TIME}, "unknown column 'positon_m_z'; did you mean 'position_m_z'"),
+    "an unknown column": ({"time_s": TIME, "positon_m_z": TIME}, "'positon_m_z'; did you mean 'position_m_z'"),
     "only time": ({"time_s": TIME}, "holds no positions or joints"),
     "two times": ({"time_s": TIME, "timestamp": TIME, "x": TIME}, "time_s and timestamp say the same"),
     "an axis twice": ({"time_s": TIME, "x": TIME, "x_mm": TIME}, "x_mm and x are the same axis"),
-    "half a quaternion": ({"time_s": TIME, "orientation_w": TIME**0, "orientation_x": TIME}, "orientation has axes w, x; expected w, x, y, z"),
-    "velocities of other axes": ({"time_s": TIME, "x": TIME, "y": TIME, "velocity_m_per_s_x": TIME}, "velocity_m_per_s has axes x; expected those of position_m"),
+    "half a quaternion": (
+        {"time_s": TIME, "orientation_w": TIME, "orientation_x": TIME},
+        "orientation has axes w, x; expected w, x, y, z",
+    ),
+    "velocities of other axes": (
+        {"time_s": TIME, "x": TIME, "y": TIME, "velocity_m_per_s_x": TIME},
+        r"velocity_m_per_s has axes x; expected those of position_m \(x, y\)",
+    ),
 }  # fmt: skip
 
 

@@ -3,7 +3,6 @@ import pytest
 
 from geomotion.demos.demonstrations import Demonstrations, Trajectory
 from geomotion.figures.demonstrations import figure_data, figure_demonstrations
-from geomotion.figures.style import save_figure
 
 TIME = np.linspace(0, 2, 20)
 
@@ -55,14 +54,21 @@ def test_planar_paths_are_drawn_once_each_with_start_and_end():
         ({"joints_rad": 7}, 7),
     ],
 )
-def test_more_dimensions_give_one_panel_each_and_projections_of_space(widths, count, tmp_path):
+def test_more_dimensions_give_one_panel_each_and_projections_of_space(widths, count):
     demos = demonstrations(**widths)
     figure = figure_demonstrations(demos)
     panels = [ax for ax in figure.axes if ax.axison]
     assert len(panels) == count
     assert all(len(lines(ax)) == 3 for ax in panels)
     assert all(ylabel.endswith("]") for _, ylabel in labels(figure))
-    assert save_figure(figure, tmp_path, "demonstrations", figure_data(demos))
+
+
+def test_the_data_behind_the_picture_are_those_of_the_demonstrations():
+    demos = demonstrations(position_m=2)
+    data = figure_data(demos)
+    assert len(data) == 3 * 2
+    np.testing.assert_array_equal(data["demo_1_position_m"], demos[1].channels["position_m"])
+    np.testing.assert_array_equal(data["demo_1_time_s"], TIME)
 
 
 def test_joints_are_labelled_with_number_and_unit():

@@ -61,6 +61,10 @@ def test_without_a_proven_rate_there_is_no_bound(plain_linear):
     assert "proves no rate" in evaluation.omitted["nearby.claimed.bound_excess"]
 
 
+def test_a_single_start_has_nothing_to_be_compared_with(plain_linear):
+    assert "nearby_starts" in judge(plain_linear(), None, starts=STARTS[:1]).omitted["nearby"]
+
+
 def test_the_array_field_answers_in_double_precision_whatever_the_fields_own(plain_linear):
     field = ArrayField(plain_linear().float())
     assert field.tensor(STARTS).dtype == torch.float32

@@ -14,10 +14,8 @@ from geomotion.tracking import StageRun
 
 @pytest.fixture
 def run(tmp_path):
-    from mlflow import MlflowClient
-
     (tmp_path / "out").mkdir()
-    return StageRun(tmp_path / "out", tmp_path / "checkpoint.pt", MlflowClient(tmp_path.as_uri()), "0")
+    return StageRun(tmp_path / "out", tmp_path / "checkpoint.pt", client=None, run_id="0")
 
 
 @pytest.fixture
@@ -62,10 +60,10 @@ def test_the_same_configuration_gives_the_same_bytes(letters, run):
     assert contents() == first
 
 
-def test_real_handwriting_alone_and_stacked(lasa_folder, run):
-    for shapes, space in ((["Angle"], "R2"), (["Angle", "Sine"], "R4")):
-        ingest(LasaDataset(name="lasa/test", shapes=shapes, root=str(lasa_folder)), {}, run)
-        assert storage.load(run.folder).space == space
+@pytest.mark.parametrize(("shapes", "space"), [(["Angle"], "R2"), (["Angle", "Sine"], "R4")])
+def test_real_handwriting_alone_and_stacked(lasa_folder, run, shapes, space):
+    ingest(LasaDataset(name="lasa/test", shapes=shapes, root=str(lasa_folder)), {}, run)
+    assert storage.load(run.folder).space == space
 
 
 def test_real_poses(robotasks9_folder, run):

@@ -22,10 +22,18 @@ class Claim(Enum):
 
 @dataclass(frozen=True)
 class Overshoot:
-    """Condition number of Dψ on the demonstrated states: by how much robot-space distances may grow at first."""
+    """How the claimed metric distorts the robot's own distances on the demonstrated states.
+
+    Attributes:
+        median: Median condition number of Dψ(x).
+        worst: Largest condition number of Dψ(x): how much a small distance at x can grow, at most, near x.
+        bound: Largest over smallest singular value of Dψ anywhere on those states: trajectories that stay among them
+            keep ‖x_t - y_t‖ ≤ bound · e^{-τt} ‖x_0 - y_0‖, measured along curves among them.
+    """
 
     median: float
     worst: float
+    bound: float
 
 
 @dataclass(frozen=True)
@@ -60,7 +68,7 @@ def certify(model: ChartedField, states: States) -> Certificate:
         model: The trained field.
         states: Demonstrated states [m], where the overshoot is evaluated.
     """
-    overshoot = chart_condition(model, states)
+    overshoot = chart_distortion(model, states)
     if isinstance(model.field, LinearField):
         return Certificate(
             Claim.by_construction,
@@ -80,11 +88,11 @@ def certify(model: ChartedField, states: States) -> Certificate:
     )
 
 
-def chart_condition(model: ChartedField, states: States) -> Overshoot:
-    """Condition number of Dψ at the given states: ‖x_t - y_t‖ ≤ condition · e^{-τt} ‖x_0 - y_0‖ locally."""
+def chart_distortion(model: ChartedField, states: States) -> Overshoot:
+    """Singular values of Dψ at the given states, summarised."""
     singular = torch.linalg.svdvals(inverse_chart_jacobian(model, states).double())
     condition = singular[:, 0] / singular[:, -1]
-    return Overshoot(float(condition.median()), float(condition.max()))
+    return Overshoot(float(condition.median()), float(condition.max()), float(singular.max() / singular.min()))
 
 
 def inverse_chart_jacobian(model: ChartedField, x: States) -> Float[Tensor, "point D D"]:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from geomotion.scores.evaluation import Evaluation, Roll
-from geomotion.scores.score import Score, max_score, share_score
+from geomotion.scores.score import Score, share_score
 
 ToClaimed = Callable[[Float[np.ndarray, "point D"]], Float[np.ndarray, "point D"]]
 Distances = Float[np.ndarray, "pair time"]
@@ -44,6 +44,8 @@ def judge_nearby(
     Source:
         Thesis Fig. 6.6; Definition 2.1 for the bound e^{-τt}.
     """
+    if len(starts) < 2:
+        return Evaluation(omitted={"nearby": "distances need two rollouts; set evaluation.nearby_starts above 1"})
     trajectories = roll(starts, times_s)
     latent = to_claimed(trajectories.reshape(-1, starts.shape[1])).reshape(trajectories.shape)
     euclidean, claimed = pairwise_distances(trajectories), pairwise_distances(latent)
@@ -66,7 +68,9 @@ def distance_scores(distances: Distances, prefix: str, note: str) -> dict[str, S
     """How the mean distance over pairs changes with time."""
     mean = distances.mean(axis=0)
     return {
-        f"{prefix}.max_expansion": max_score(mean / mean[0], "1", f"mean distance relative to the start; {note}"),
+        f"{prefix}.max_expansion": Score(
+            float((mean / mean[0]).max()), "1", len(distances), statistic="max", note=f"mean distance / initial; {note}"
+        ),
         f"{prefix}.growing_share": share_score(np.diff(mean) > 0, f"steps in which the mean distance grows; {note}"),
         f"{prefix}.final_ratio": Score(
             float(mean[-1] / mean[0]), "1", len(distances), statistic="final / initial mean", note=note

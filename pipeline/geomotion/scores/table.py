@@ -20,8 +20,8 @@ TITLES = {
 def scores_table(document: Mapping[str, Any]) -> str:
     """The scores of a ``scores.json`` document, one line each, in groups; then what was left out, and why.
 
-    A spread is a standard deviation over the `n` values behind a score. What is neither a mean nor a share of
-    them is named in the last column.
+    A spread is a standard deviation over the `n` values behind a mean. What is neither a mean nor a share of them is
+    named in the last column.
     """
     lines = [f"{document['dataset']}, protocol {document['protocol']}"]
     scores: Mapping[str, Mapping[str, Any]] = document["scores"]
@@ -37,7 +37,7 @@ def scores_table(document: Mapping[str, Any]) -> str:
 
 def _row(name: str, score: Mapping[str, Any], width: int) -> str:
     value = _number(score["value"])
-    spread = f"± {_number(score['spread'])}" if score["spread"] else ""
+    spread = f"± {_number(score['spread'])}" if score["spread"] and score["statistic"] != "max" else ""
     unit = "" if score["unit"] == "1" else score["unit"]
     statistic = "" if score["statistic"] in {"mean", "share"} else score["statistic"]
     return f"  {name:<{width}}  {value:>10} {spread:<11} {unit:<5}  n={score['count']:<5} {statistic}".rstrip()

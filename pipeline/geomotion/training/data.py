@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from geomotion.demos.demonstrations import Demonstrations
-from geomotion.types import Float, Tensor, Times
+from geomotion.types import Float, Tensor
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class TrainingSet:
         velocities: Velocities [m/s].
     """
 
-    times: tuple[Times, ...]
-    states: tuple[Float[Tensor, "time D"], ...]
-    velocities: tuple[Float[Tensor, "time D"], ...]
+    times: tuple[Float[Tensor, " _"], ...]
+    states: tuple[Float[Tensor, "_ D"], ...]
+    velocities: tuple[Float[Tensor, "_ D"], ...]
 
     @classmethod
     def from_demonstrations(cls, demonstrations: Demonstrations, channels: Sequence[str]) -> "TrainingSet":

@@ -5,20 +5,21 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
 from geomotion.errors import CorruptArtefact, TrainingDiverged
-from geomotion.files import atomic
+from geomotion.files import write_tensors
 from geomotion.interrupts import PendingInterrupt, postponed_interrupts
 
 Losses = Mapping[str, Tensor]
 Log = Callable[[int, Mapping[str, float]], None]
 
 
+@runtime_checkable
 class Objective(Protocol):
     """What a model is fitted to."""
 
@@ -101,7 +102,7 @@ def _step(
     losses = objective(model, progress, torch.Generator().manual_seed(schedule.seed * 1_000_003 + step))
     total = torch.stack(list(losses.values())).sum()
     if not torch.isfinite(total):
-        raise TrainingDiverged(step, float(total))
+        raise TrainingDiverged(step, float(total.detach()))
     optimiser.zero_grad()
     total.backward()
     nn.utils.clip_grad_norm_(model.parameters(), schedule.gradient_clip)
@@ -127,8 +128,7 @@ def _checkpoint_if_due(
 ) -> None:
     if pending.signal_number is not None or (done % schedule.checkpoint_every_steps == 0 and done < schedule.steps):
         state = {"step": done, "model": model.state_dict(), "optimiser": optimiser.state_dict(), "history": history.rows}
-        with atomic(path) as temporary:
-            torch.save(state, temporary)
+        write_tensors(path, state)
     pending.raise_if_set()
 
 
