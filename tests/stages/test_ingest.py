@@ -1,3 +1,4 @@
+import hashlib
 import json
 
 import numpy as np
@@ -12,10 +13,25 @@ from geomotion.stages.ingest import ingest, summary_table
 from geomotion.tracking import StageRun
 
 
+class Client:
+    """Stands in for MLflow's and remembers the datasets it was told of."""
+
+    def __init__(self):
+        self.datasets = []
+
+    def log_inputs(self, run_id, datasets):
+        self.datasets += [(run_id, entry.dataset.name, entry.dataset.digest) for entry in datasets]
+
+
 @pytest.fixture
-def run(tmp_path):
+def client():
+    return Client()
+
+
+@pytest.fixture
+def run(tmp_path, client):
     (tmp_path / "out").mkdir()
-    return StageRun(tmp_path / "out", tmp_path / "checkpoint.pt", client=None, run_id="0")
+    return StageRun(tmp_path / "out", tmp_path / "checkpoint.pt", client=client, run_id="0")
 
 
 @pytest.fixture
@@ -32,6 +48,12 @@ def test_what_is_written_is_what_was_read_and_preprocessed(letters, run):
     for found, wanted in zip(stored.trajectories, expected.trajectories, strict=True):
         np.testing.assert_array_equal(found.time_s, wanted.time_s)
         np.testing.assert_array_equal(found.velocity(["position_m"]), wanted.velocity(["position_m"]))
+
+
+def test_the_dataset_is_linked_to_the_run_with_a_digest_of_its_samples(letters, run, client):
+    ingest(letters, {}, run)
+    samples = (run.folder / storage.DATA).read_bytes()
+    assert client.datasets == [("0", "letters/s", hashlib.sha256(samples).hexdigest()[:36])]
 
 
 def test_the_summary_is_a_document_and_a_table(letters, run):

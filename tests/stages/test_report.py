@@ -80,6 +80,7 @@ def scores():
             "train.dtwd_to_nearest_demo": score(3.6, "mm", note="baseline: nearest other demonstration"),
             "heldout.dtwd_per_point": score(2.82, "mm", count=2, note="per point"),
             "heldout.end_point_error": score(None, "mm", spread=None, count=2),
+            "contraction.true.rate": score(12.5, "1/s", statistic="max", count=16),
             "contraction.true.non_contracting_fraction": score(0.25, "1", statistic="share", count=16, spread=0.0),
         },
         "omitted": {"contraction.jhat": "only a line-integral field has one"},
@@ -170,6 +171,7 @@ def test_page_shows_scores_beside_their_baselines_with_spread_and_count(stages, 
     assert sorted(rows, key=text.index) == rows
     assert "not finite" in text
     assert "25 % of 16" in text
+    assert "12.5 1/s max, n = 16, standard deviation 0.25" in text
 
 
 def test_verdict_by_construction_names_rate_and_what_is_measured(stages, tmp_path):

@@ -27,10 +27,13 @@ OWN_KEY = "geomotion"  # entry of info.json that other tools ignore
 COLUMN_OF_CHANNELS = {"observation.state": False, "action": True}  # whether a column holds velocities
 
 
-def save(demonstrations: Demonstrations, folder: Path) -> None:
+def save(demonstrations: Demonstrations, folder: Path) -> str:
     """Write `demonstrations` to `folder`; :func:`load` gives back every bit.
 
     An earlier dataset there is replaced. Interrupted, it leaves no ``info.json``, and hence no dataset.
+
+    Returns:
+        SHA-256 of the samples.
 
     Raises:
         DiskFull: If space ran out.
@@ -40,6 +43,7 @@ def save(demonstrations: Demonstrations, folder: Path) -> None:
     _write_table(_episodes(demonstrations), folder / EPISODES)
     _write_tasks(demonstrations, folder / TASKS)
     write_json(folder / INFO, _info(demonstrations, folder))
+    return _digest(folder / DATA)
 
 
 def load(folder: Path) -> Demonstrations:

@@ -35,6 +35,7 @@ class CouplingFlow(nn.Module):
     """
 
     frequencies: Tensor
+    phases: Tensor
     moved: Tensor
 
     def __init__(
@@ -44,21 +45,22 @@ class CouplingFlow(nn.Module):
         self.dim = dim
         self.log_scale_cap = log_scale_cap
         kept = alternating_halves(dim, layers)
-        angles = features // 2 * (dim // 2)
-        frequencies = torch.zeros(layers, dim, angles)
+        pairs = features // 2 * (dim // 2)
+        frequencies = torch.zeros(layers, dim, pairs)
         for layer in range(layers):
-            frequencies[layer, kept[layer]] = normal_frequencies(angles, int(kept[layer].sum()), length_scales)
-        self.register_buffer("frequencies", frequencies)
+            frequencies[layer, kept[layer]] = normal_frequencies(pairs, int(kept[layer].sum()), length_scales)
+        self.register_buffer("frequencies", frequencies.repeat(1, 1, 2))
+        self.register_buffer("phases", torch.tensor([0.0, -math.pi / 2]).repeat_interleave(pairs))
         self.register_buffer("moved", (~kept).to(frequencies))
-        self.gain = math.sqrt(1 / angles)  # each pair of cosine and sine has norm 1
-        self.weight = nn.Parameter(torch.zeros(layers, 2 * angles, 2 * dim))
+        self.gain = math.sqrt(1 / pairs)  # each pair of cosine and sine has norm 1
+        self.weight = nn.Parameter(torch.zeros(layers, 2 * pairs, 2 * dim))
         self.bias = nn.Parameter(torch.zeros(layers, 2 * dim))
 
     def to_latent(self, x: State) -> State:
         """ψ(x)."""
         for frequencies, weight, bias in self._layers():
             squashed, shift, _ = self._condition(x, frequencies, weight, bias)
-            x = torch.addcmul(shift, x, (self.log_scale_cap * squashed).exp())
+            x = x * self._scale(squashed) + shift
         return x
 
     def to_ambient(self, z: State) -> State:
@@ -66,41 +68,44 @@ class CouplingFlow(nn.Module):
         for frequencies, weight, bias in reversed(self._layers()):
             # kept coordinates are the same on both sides of a layer, so its conditioner can be asked again
             squashed, shift, _ = self._condition(z, frequencies, weight, bias)
-            z = (z - shift) * (-self.log_scale_cap * squashed).exp()
+            z = (z - shift) * self._scale(-squashed)
         return z
 
     def linearise(self, x: State) -> tuple[State, PushForward]:
         """ψ(x) and ż ↦ Dψ(x)⁻¹ ż."""
         tape = []
         for frequencies, weight, bias in self._layers():
-            squashed, shift, features = self._condition(x, frequencies, weight, bias)
-            scale = (self.log_scale_cap * squashed).exp()
-            tape.append((frequencies, weight, features, squashed, scale, x))
-            x = torch.addcmul(shift, x, scale)
+            squashed, shift, angles = self._condition(x, frequencies, weight, bias)
+            scale = self._scale(squashed)
+            scaled = x * scale
+            tape.append((frequencies, weight, angles, squashed, scale, scaled))
+            x = scaled + shift
 
         def push_forward(tangent: Tensor) -> Tensor:
-            for frequencies, weight, features, squashed, scale, x in reversed(tape):
-                cosine, sine = features.chunk(2, -1)
-                angle_rate = tangent @ frequencies
-                raw_rate, shift_rate = (torch.cat([-sine * angle_rate, cosine * angle_rate], -1) @ weight).chunk(2, -1)
-                log_scale_rate = raw_rate * (1 - squashed * squashed)
-                tangent = (tangent - shift_rate) / scale - x * log_scale_rate
+            # a tangent's kept coordinates pass a layer unchanged, so the angles' rates are known before it is undone
+            for frequencies, weight, angles, squashed, scale, scaled in reversed(tape):
+                falling = torch.sin(angles) * (tangent @ frequencies)  # minus the rate of the features
+                raw, shift = (falling @ weight).chunk(2, -1)
+                log_scale = raw * (self.log_scale_cap - self.log_scale_cap * squashed * squashed)
+                tangent = (tangent + scaled * log_scale + shift) / scale
             return tangent
 
         return x, push_forward
 
     def _layers(self) -> list[tuple[Tensor, Tensor, Tensor]]:
         """Frequencies, weight and bias of each layer, with zeros where kept coordinates would be moved."""
-        mask = torch.cat([self.moved, self.moved], -1)
+        mask = torch.cat([self.moved / self.log_scale_cap, self.moved], -1)
         weight = self.weight * (self.gain * mask[:, None])
         return list(zip(self.frequencies.unbind(), weight.unbind(), (self.bias * mask).unbind(), strict=True))
 
     def _condition(self, x: State, frequencies: Tensor, weight: Tensor, bias: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """s / cap and t, zero for kept coordinates, and the features behind them."""
-        angles = x @ frequencies
-        features = torch.cat([angles.cos(), angles.sin()], -1)
-        raw, shift = (features @ weight + bias).chunk(2, -1)
-        return torch.tanh(raw / self.log_scale_cap), shift, features
+        """s / cap and t, zero for kept coordinates, and the angles behind them."""
+        angles = x @ frequencies + self.phases
+        raw, shift = (torch.cos(angles) @ weight + bias).chunk(2, -1)
+        return torch.tanh(raw), shift, angles
+
+    def _scale(self, squashed: State) -> State:
+        return (self.log_scale_cap * squashed).exp()
 
 
 def alternating_halves(dim: int, layers: int) -> Bool[Tensor, "layer D"]:

@@ -1,7 +1,10 @@
 """Scores of several runs side by side."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
+
+from geomotion.tables import aligned
 
 OBJECTIVE = ("heldout.dtwd_per_point", "train.dtwd_per_point")
 
@@ -10,7 +13,8 @@ def objective(scores: Mapping[str, Any]) -> float | None:
     """The score that sweeps minimise: held-out DTWD where there is one, that of the training set otherwise."""
     for name in OBJECTIVE:
         if name in scores["scores"]:
-            return float(scores["scores"][name]["value"])
+            value = scores["scores"][name]["value"]
+            return math.inf if value is None else float(value)  # null: a rollout diverged
     return None
 
 
@@ -32,12 +36,11 @@ def comparison_table(comparison: Mapping[str, Any]) -> str:
     for name, row in comparison["scores"].items():
         unit = next(iter(row.values()))["unit"]
         lines.append([name, unit, *(_cell(row.get(run)) for run in runs)])
-    widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines)
+    return aligned(lines)
 
 
 def _cell(score: Mapping[str, Any] | None) -> str:
-    if score is None:
-        return "-"
+    if score is None or score["value"] is None:
+        return "-" if score is None else "not finite"
     spread = f" ± {score['spread']:.3g}" if score["spread"] else ""
     return f"{score['value']:.4g}{spread}"

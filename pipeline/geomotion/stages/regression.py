@@ -12,6 +12,7 @@ from typing import Any
 from geomotion.config import CheckConfig
 from geomotion.errors import InvalidSetting, MissingData
 from geomotion.files import read_json, write_json
+from geomotion.tables import aligned
 
 
 @dataclass(frozen=True)
@@ -54,13 +55,21 @@ def check(config: CheckConfig, scores: Mapping[str, Any]) -> Verdict:
 
 
 def _judge(name: str, expected: Mapping[str, Any], found: Mapping[str, Any] | None) -> dict[str, Any]:
-    row = {"name": name, "baseline": expected["value"], "tolerance": expected["tolerance"], "now": None, "verdict": "missing"}
-    if found is not None:
-        sign = 1 if expected["better"] == "lower" else -1
-        change = sign * (found["value"] - expected["value"])
-        verdict = "worse" if change > expected["tolerance"] else "better" if change < -expected["tolerance"] else "ok"
-        row |= {"now": found["value"], "verdict": verdict}
-    return row
+    now = None if found is None else found["value"]
+    return {
+        "name": name,
+        "baseline": expected["value"],
+        "tolerance": expected["tolerance"],
+        "now": now,
+        "verdict": "missing" if now is None else _verdict(expected, now),
+    }
+
+
+def _verdict(expected: Mapping[str, Any], now: float) -> str:
+    worsening = now - expected["value"] if expected["better"] == "lower" else expected["value"] - now
+    if worsening > expected["tolerance"]:
+        return "worse"
+    return "better" if worsening < -expected["tolerance"] else "ok"
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
@@ -68,5 +77,4 @@ def _table(rows: list[dict[str, Any]]) -> str:
     for row in rows:
         now = "-" if row["now"] is None else f"{row['now']:.4g}"
         lines.append((row["name"], f"{row['baseline']:.4g}", now, f"{row['tolerance']:.2g}", row["verdict"]))
-    widths = [max(len(line[column]) for line in lines) for column in range(5)]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines)
+    return aligned(lines)

@@ -106,7 +106,7 @@ def _training_facts(train: Artefacts) -> dict[str, str]:
     path = train.path("training.csv")
     try:
         last = pd.read_csv(path).iloc[-1]
-        return {"Training": f"{int(last['step'])} steps, final loss {float(last['total']):.3g}"}
+        return {"Training": f"{int(last['step']) + 1} steps, final loss {float(last['total']):.3g}"}
     except (ValueError, KeyError, IndexError) as error:
         raise CorruptArtefact(path, f"not a table with columns step and total ({error})") from error
 

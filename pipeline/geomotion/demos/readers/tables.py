@@ -21,7 +21,7 @@ def read_csv(path: Path) -> Table:
 
     try:
         frame = pd.read_csv(path, skipinitialspace=True)
-    except (pd.errors.EmptyDataError, pd.errors.ParserError, UnicodeDecodeError) as error:
+    except (pd.errors.EmptyDataError, pd.errors.ParserError, UnicodeDecodeError, OSError) as error:
         raise DatasetError(path, f"not a CSV file with one header line ({_one_line(error)})") from error
     return {str(name): frame[name].to_numpy() for name in frame.columns}
 

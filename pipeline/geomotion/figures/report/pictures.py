@@ -41,12 +41,12 @@ CAPTIONS = {
     "eigenvalues": (
         "Where the field contracts",
         "Blue: nearby motions approach each other at once. Red, outlined and hatched in maps: they part at first. The "
-        "panels share one colour scale, cut at the 95th percentile. Only the true Jacobian describes the motion.",
+        "panels share one scale, cut at the 95th percentile. Only the true Jacobian describes the motion.",
     ),
     "nearby": (
         "Nearby motions",
-        "Do they come together? Below 1 they are closer than at the start. The solid curve has to stay under the dashed "
-        "bound where one is proven; the Euclidean curve may rise above 1 first.",
+        "Do they come together? Below 1 they are closer than at the start. The solid curve has to stay under the "
+        "dashed bound where one is proven; the Euclidean curve may rise above 1 first.",
     ),
     "region": (
         "Time inside the demonstration region",

@@ -8,6 +8,7 @@ from typing import Any
 from geomotion.scores.table import TITLES
 
 Scores = Mapping[str, Mapping[str, Any]]
+CENTRAL = ("mean", "pooled")  # statistics that lie in the middle of their values
 SETS = {"train": "training", "heldout": "held out"}
 
 # In the order of the table; under each score, the baselines that it has to beat.
@@ -122,7 +123,7 @@ def headlines(scores: Scores) -> list[Headline]:
         note = f"on {kind} demonstrations; 0 is perfect, 1 as good as standing still"
         chosen.append(Headline("Relative velocity error", _quantity(scores, name), note))
     if "goal.never_reached" in scores:
-        note = f"of {scores['goal.never_reached'].get('count', '?')} starts on a grid"
+        note = f"of {scores['goal.never_reached'].get('count', '?')} starts around the demonstrations"
         chosen.append(Headline("Never reach the goal", _quantity(scores, "goal.never_reached"), note))
     return chosen
 
@@ -133,13 +134,16 @@ def _quantity(scores: Scores, name: str) -> str:
 
 
 def cell(score: Mapping[str, Any]) -> Cell:
-    """A score in print."""
+    """A score in print; "±" only where the value is the middle of what it summarises."""
     count, spread = score.get("count", 1), score.get("spread")
     statistic = str(score.get("statistic", "mean"))
     if statistic == "share":
         return Cell(_percentage(score["value"]), "", f"of {count}")
-    shown = f"± {_number(spread, digits=2)}" if count > 1 and spread not in (0, None) else ""
-    return Cell(_number(score["value"]), shown, f"n = {count}" if statistic == "mean" else f"{statistic}, n = {count}")
+    shown = _number(spread, digits=2) if count > 1 and spread not in (0, None) else ""
+    if statistic in CENTRAL:
+        return Cell(_number(score["value"]), f"± {shown}" if shown else "", f"n = {count}")
+    details = [statistic, f"n = {count}", f"standard deviation {shown}" if shown else ""]
+    return Cell(_number(score["value"]), "", ", ".join(detail for detail in details if detail))
 
 
 def label(name: str) -> str:

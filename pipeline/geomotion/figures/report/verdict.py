@@ -105,9 +105,14 @@ def _measured_sentences(grid: EigenvalueGrid | None) -> tuple[str, ...]:
     if grid is None:
         return claim, "Nor was it measured: the evaluation holds no eigenvalues."
     share = percent(not_contracting(grid.true))
+    matrix = (
+        ""
+        if grid.jhat is None
+        else f" (the network's matrix Ĵ alone would suggest {percent(not_contracting(grid.jhat))})"
+    )
     return claim, (
         f"At {share} of the {len(grid.true)} points checked around the demonstrations, nearby motions at first part "
-        "instead of approaching each other."
+        f"instead of approaching each other{matrix}."
     )
 
 
