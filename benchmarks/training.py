@@ -43,7 +43,12 @@ def main() -> None:
     velocity = schema.VelocityTraining()
     print(f"Training steps per second, 5 demonstrations of 1000 points, {STEPS} steps\n{'':<48}{'wall':>8}{'CPU':>8}")
     for name, model, objective, rate in (
-        ("linear in a flow, before the nearest-point term", linear, TrajectoryReproduction(data, geometry, early), 1e-2),
+        (
+            "linear in a flow, before the nearest-point term",
+            linear,
+            TrajectoryReproduction(data, geometry, early),
+            1e-2,
+        ),
         ("linear in a flow, with the nearest-point term", linear, TrajectoryReproduction(data, geometry, late), 1e-2),
         ("line integral", integral, VelocityReconstruction(data, geometry, velocity.batch_points), 1e-3),
     ):

@@ -179,12 +179,16 @@ class FlowChart(ChartConfig):
 
     layers: int = 10
     features: int = 64  # of each layer, per coordinate that it keeps
-    length_scales: list[float] = default(default_factory=lambda: [0.25, 0.5, 1.0])  # of the scaled data, which fill [-1, 1]
+    length_scales: list[float] = default(
+        default_factory=lambda: [0.25, 0.5, 1.0]
+    )  # of the scaled data, which fill [-1, 1]
     log_scale_cap: float = 1.5
 
     def __post_init__(self) -> None:
         _require_positive("chart", self, "layers", "features", "log_scale_cap")
-        _require(self.features % 2 == 0, "chart.features", self.features, "an even number: cosine and sine of each angle")
+        _require(
+            self.features % 2 == 0, "chart.features", self.features, "an even number: cosine and sine of each angle"
+        )
         scales = self.length_scales
         _require(len(scales) > 0 and min(scales) > 0, "chart.length_scales", scales, "one or more positive lengths")
 
@@ -326,9 +330,10 @@ class TrajectoryTraining(TrainingConfig):
     equal_time_warm_up_weight: float = 20.0
     equal_time_weight: float = 1.0  # after the warm-up
     nearest_point_weight: float = 5.0  # squared distance between whole curves
-    nearest_point_mean_weight: float = 0.5  # distance between whole curves
+    nearest_point_mean_weight: float = 1.0  # distance between whole curves
     velocity_weight: float = 0.1
-    mixing: float = 0.0  # demonstrations are mixed in pairs by up to this share
+    weight_penalty: float = 1e-5  # on the chart's squared parameters
+    mixing: float = 0.5  # demonstrations are mixed in pairs by up to this share
     starts: int = 4  # of each demonstration in each step
     times: int = 32  # of each start
     curve_points: int = 64
@@ -477,7 +482,10 @@ class NcdsConfig(GmsConfig):
 def plain(value: object) -> Any:
     """Configuration objects as JSON types; each dataclass says which one it is."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {"kind": type(value).__name__, **{name: plain(getattr(value, name)) for name in (item.name for item in fields(value))}}
+        return {
+            "kind": type(value).__name__,
+            **{name: plain(getattr(value, name)) for name in (item.name for item in fields(value))},
+        }
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, Mapping):

@@ -142,7 +142,9 @@ def _regulariser(config: schema.RegulariserConfig, dim: int) -> Regulariser:
 def _refuse_regulariser(config: schema.RegulariserConfig) -> None:
     if not isinstance(config, schema.NoRegulariser):
         raise InvalidSetting(
-            "regulariser", type(config).__name__, "none: a linear field contracts by construction; its rate is field.min_rate_per_duration"
+            "regulariser",
+            type(config).__name__,
+            "none: a linear field contracts by construction; its rate is field.min_rate_per_duration",
         )
 
 

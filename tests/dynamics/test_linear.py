@@ -58,7 +58,9 @@ def test_the_solution_starts_at_the_start_for_any_batch_shape():
 def test_matrix_exponentials_of_a_rotation_are_rotations():
     angle = torch.tensor([0.0, 0.5, 2.0], dtype=torch.float64)
     generator = torch.tensor([[0.0, -1.0], [1.0, 0.0]], dtype=torch.float64)
-    expected = torch.stack([torch.stack([angle.cos(), -angle.sin()], -1), torch.stack([angle.sin(), angle.cos()], -1)], -2)
+    expected = torch.stack(
+        [torch.stack([angle.cos(), -angle.sin()], -1), torch.stack([angle.sin(), angle.cos()], -1)], -2
+    )
     torch.testing.assert_close(matrix_exponentials(generator, angle), expected)
 
 

@@ -124,6 +124,7 @@ def test_area_that_does_not_contract_is_outlined_at_eigenvalue_zero(planar_array
     ax = draw_eigenvalue_map(Figure().add_subplot(), points, shape, panel, robust_norm([panel.eigenvalues]))
     outline = np.concatenate([path.vertices for path in ax.collections[-1].get_paths()])
     np.testing.assert_allclose(outline[:, 0], x0, atol=1e-12)
+    np.testing.assert_allclose(np.ptp(outline[:, 1]), np.ptp(points[:, 1]))
 
 
 def test_map_does_not_depend_on_the_order_of_the_grid(planar_arrays):

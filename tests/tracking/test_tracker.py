@@ -133,7 +133,13 @@ class TestLineage:
         ingested = execute(config, Stage("ingest", Counting()), {})
         trained = execute(config, Stage("train", Counting()), {}, {"ingest": ingested})
         tracker = Tracker(config)
-        for name in ("latest", trained.run_id, trained.run_id[:8], str(trained.folder), str(trained.folder / "value.txt")):
+        for name in (
+            "latest",
+            trained.run_id,
+            trained.run_id[:8],
+            str(trained.folder),
+            str(trained.folder / "value.txt"),
+        ):
             assert tracker.lineage(name) == {"ingest": ingested, "train": trained}
 
     def test_missing_runs_are_reported(self, config):

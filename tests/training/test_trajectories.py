@@ -49,14 +49,16 @@ def test_the_true_system_has_almost_no_loss(objective_and_model):
 
 def test_the_nearest_point_term_begins_after_the_warm_up(objective_and_model):
     objective, model, _ = objective_and_model
-    assert set(objective(model, 0.39, generator())) == {"velocity", "equal_time"}
-    assert set(objective(model, 0.41, generator())) == {"velocity", "equal_time", "nearest_point"}
+    assert set(objective(model, 0.39, generator())) == {"velocity", "weights", "equal_time"}
+    assert set(objective(model, 0.41, generator())) == {"velocity", "weights", "equal_time", "nearest_point"}
 
 
 def test_the_same_generator_gives_the_same_losses(objective_and_model):
     objective, model, _ = objective_and_model
     first, second = (objective(model, 0.9, generator()) for _ in range(2))
-    assert {name: float(value) for name, value in first.items()} == {name: float(value) for name, value in second.items()}
+    assert {name: float(value) for name, value in first.items()} == {
+        name: float(value) for name, value in second.items()
+    }
 
 
 def test_one_demonstration_is_enough(spirals):

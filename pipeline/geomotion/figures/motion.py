@@ -21,7 +21,7 @@ DASHES = (0, (3, 1.5))  # held-out rollouts
 def draw_flow(ax: Axes, flow: Flow) -> Axes:
     """Draw the vector field as streamlines."""
     x, y = (np.unique(flow.points[:, axis]) for axis in (0, 1))
-    order = np.arange(len(flow.points))
+    order = np.lexsort((flow.points[:, 0], flow.points[:, 1]))
     u, v = (flow.velocity[order, axis].reshape(len(y), len(x)) for axis in (0, 1))
     # streamplot insists on equal spacing to the last digit
     x, y = np.linspace(x[0], x[-1], len(x)), np.linspace(y[0], y[-1], len(y))

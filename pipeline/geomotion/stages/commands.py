@@ -2,6 +2,7 @@
 
 import logging
 import os
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -68,6 +69,7 @@ class Session:
     tracker: Tracker
     command: CommandRun
     config: Any
+    reproduction: str  # the command line that makes the trained run again
     done: dict[str, Artefacts] = field(default_factory=dict)
 
     def produce(self, name: str) -> Artefacts:
@@ -75,7 +77,7 @@ class Session:
         if name not in self.done:
             step = STEPS[name]
             inputs = {needed: self.produce(needed) for needed in step.needs}
-            self.done[name] = self.tracker.run_stage(step.stage, step.configure(self.config), inputs, self.command)
+            self.done[name] = self.tracker.run_stage(step.stage, step.configure(self), inputs, self.command)
         return self.done[name]
 
     def document(self, **content: Any) -> dict[str, Any]:
@@ -90,12 +92,18 @@ def _session(name: str, config: GmsConfig, overrides: list[str]) -> Iterator[Ses
     if run is not None:
         _refuse_training_overrides(run, overrides)
         if not store.exists(config.tracking):
-            raise MissingRun(run, f"there is no store in {config.tracking.root}/ yet. Train first: ncds train dataset=…")
+            raise MissingRun(
+                run, f"there is no store in {config.tracking.root}/ yet. Train first: ncds train dataset=…"
+            )
     tracker = Tracker(config.tracking, config.reuse)
     done = _trained(tracker, run) if run is not None else {}
+    typed = overrides if run is None else tracker.overrides(run)
+    reproduction = shlex.join(
+        ["ncds", "run", *(item for item in typed if item.split("=")[0] not in ("reuse", "output"))]
+    )
     with tracker.command(name, config, overrides) as command:
         tracker.link(command, done)
-        yield Session(tracker, command, config, done)
+        yield Session(tracker, command, config, reproduction, done)
 
 
 def _trained(tracker: Tracker, run: str) -> dict[str, Artefacts]:
@@ -109,7 +117,9 @@ def _refuse_training_overrides(run: str, overrides: list[str]) -> None:
     for override in overrides:
         key = override.lstrip("+~").split("=")[0]
         if key.split(".")[0].split("/")[0] not in EXECUTION_KEYS:
-            raise InvalidSetting(key, override.partition("=")[2], f"no such key beside run={run}, whose training is finished")
+            raise InvalidSetting(
+                key, override.partition("=")[2], f"no such key beside run={run}, whose training is finished"
+            )
 
 
 def _log_to_standard_error() -> None:
@@ -128,10 +138,11 @@ class Step:
 
     stage: Stage
     needs: tuple[str, ...]
-    configure: Callable[[Any], object]
+    configure: Callable[["Session"], object]
 
 
-def _train_config(config: NcdsConfig) -> TrainConfig:
+def _train_config(session: Session) -> TrainConfig:
+    config: NcdsConfig = session.config
     dataset = config.dataset
     return TrainConfig(
         # the base class: where recordings come from must not decide whether a training is repeated
@@ -142,19 +153,29 @@ def _train_config(config: NcdsConfig) -> TrainConfig:
     )
 
 
+def _rollout_config(session: Session) -> RolloutStageConfig:
+    return RolloutStageConfig(session.config.rollout, session.config.solver)
+
+
+def _evaluate_config(session: Session) -> EvaluateConfig:
+    return EvaluateConfig(session.config.evaluation, session.config.solver)
+
+
+def _export_config(session: Session) -> ExportConfig:
+    return ExportConfig(session.config.tracking.register_as)
+
+
+def _report_config(session: Session) -> ReportConfig:
+    return ReportConfig(command=session.reproduction)
+
+
 STEPS: dict[str, Step] = {
-    "ingest": Step(Stage("ingest", ingest, reads_outside=True), (), lambda config: config.dataset),
+    "ingest": Step(Stage("ingest", ingest, reads_outside=True), (), lambda session: session.config.dataset),
     "train": Step(Stage("train", train), ("ingest",), _train_config),
-    "rollout": Step(
-        Stage("rollout", rollout), ("ingest", "train"), lambda config: RolloutStageConfig(config.rollout, config.solver)
-    ),
-    "evaluate": Step(
-        Stage("evaluate", evaluate), ("ingest", "train"), lambda config: EvaluateConfig(config.evaluation, config.solver)
-    ),
-    "export": Step(Stage("export", export), ("train",), lambda config: ExportConfig(config.tracking.register_as)),
-    "report": Step(
-        Stage("report", report), ("ingest", "train", "rollout", "evaluate", "export"), lambda config: ReportConfig()
-    ),
+    "rollout": Step(Stage("rollout", rollout), ("ingest", "train"), _rollout_config),
+    "evaluate": Step(Stage("evaluate", evaluate), ("ingest", "train"), _evaluate_config),
+    "export": Step(Stage("export", export), ("train",), _export_config),
+    "report": Step(Stage("report", report), ("ingest", "train", "rollout", "evaluate", "export"), _report_config),
 }
 
 
@@ -185,7 +206,9 @@ def _evaluate(session: Session) -> VerbResult:
     scores = read_json(found.path("scores.json"))
     certificate = read_json(found.path("certificate.json"))
     text = f"{scores_table(scores)}\n\n{_certificate_line(certificate)}\nscores  {found.path('scores.json')}"
-    return VerbResult(text, session.document(scores=scores, certificate=certificate), objective=compare.objective(scores))
+    return VerbResult(
+        text, session.document(scores=scores, certificate=certificate), objective=compare.objective(scores)
+    )
 
 
 def _report(session: Session) -> VerbResult:
@@ -205,7 +228,7 @@ def _compare(session: Session) -> VerbResult:
         raise InvalidSetting("runs", runs, "two or more trained runs, for example runs=[latest,1a2b3c4d]")
     documents = {}
     for run in runs:
-        one = Session(session.tracker, session.command, session.config, _trained(session.tracker, run))
+        one = Session(session.tracker, session.command, session.config, "", _trained(session.tracker, run))
         documents[run] = read_json(one.produce("evaluate").path("scores.json"))
     comparison = compare.comparison(documents)
     session.tracker.log_document(session.command, "scores.json", comparison)
@@ -224,7 +247,18 @@ def _ui(config: GmsConfig) -> VerbResult:
         raise MissingRun("latest", f"there is no store in {config.tracking.root}/ yet. Make one with: ncds run")
     uri = store.store_uri(config.tracking)
     print(f"MLflow on {uri}: open http://127.0.0.1:5000/#/experiments (Ctrl-C ends it)", file=sys.stderr, flush=True)
-    command = [sys.executable, "-m", "mlflow", "ui", "--backend-store-uri", uri, "--host", "127.0.0.1", "--workers", "1"]
+    command = [
+        sys.executable,
+        "-m",
+        "mlflow",
+        "ui",
+        "--backend-store-uri",
+        uri,
+        "--host",
+        "127.0.0.1",
+        "--workers",
+        "1",
+    ]
     os.execv(sys.executable, command)
 
 

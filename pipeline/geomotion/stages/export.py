@@ -34,7 +34,12 @@ def export(config: ExportConfig, inputs: Mapping[str, Artefacts], run: StageRun)
     export_onnx(skill.field, path)
     policy = OnnxPolicy(path)
     document: dict[str, Any] = {
-        "input": {"name": INPUT, "shape": ["batch", skill.field.dim], "unit": "m", "channels": list(skill.state_channels)},
+        "input": {
+            "name": INPUT,
+            "shape": ["batch", skill.field.dim],
+            "unit": "m",
+            "channels": list(skill.state_channels),
+        },
         "output": {"name": OUTPUT, "shape": ["batch", skill.field.dim], "unit": "m/s"},
         "goal_m": list(skill.geometry.goal),
         "max_difference_to_torch_m_per_s": _largest_difference(skill, policy),

@@ -73,7 +73,8 @@ def _starts(config: RolloutConfig, demonstrations: Demonstrations, skill: Skill)
         duration = config.duration_s or skill.geometry.duration_s
         times = np.linspace(0.0, duration, config.points or 1000)
         return [
-            Start(f"start {number}", _state(start, skill.field.dim), times) for number, start in enumerate(config.starts_m)
+            Start(f"start {number}", _state(start, skill.field.dim), times)
+            for number, start in enumerate(config.starts_m)
         ]
     chosen = demonstrations.select(config.demos if config.demos is not None else range(len(demonstrations)))
     numbers = config.demos if config.demos is not None else range(len(demonstrations))

@@ -13,7 +13,18 @@ from geomotion.config import plain
 from geomotion.errors import CorruptArtefact, MissingArtefact
 
 NOT_DIGESTED = ("figures", "config.json", "environment.json")
-PACKAGES = ("geomotion", "torch", "torchdiffeq", "numpy", "scipy", "pandas", "hydra-core", "mlflow", "shapely", "onnxruntime")
+PACKAGES = (
+    "geomotion",
+    "torch",
+    "torchdiffeq",
+    "numpy",
+    "scipy",
+    "pandas",
+    "hydra-core",
+    "mlflow",
+    "shapely",
+    "onnxruntime",
+)
 
 
 @dataclass(frozen=True)

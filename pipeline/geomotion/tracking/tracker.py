@@ -2,6 +2,7 @@
 
 import json
 import logging
+import shlex
 import shutil
 import tempfile
 import time
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from mlflow.entities import Run
 
 COMMAND, STAGE, KEY, DIGEST, ERROR = (f"geomotion.{name}" for name in ("command", "stage", "key", "digest", "error"))
+OVERRIDES = "geomotion.overrides"
 INPUT = "geomotion.input."
 MEMBER = "geomotion.stage."
 PARENT = "mlflow.parentRunId"
@@ -65,8 +67,8 @@ class Tracker:
     @contextmanager
     def command(self, name: str, config: object, overrides: list[str]) -> Iterator[CommandRun]:
         """The run of a whole command; failed or killed if the block raises."""
-        tags = {COMMAND: name, "geomotion.overrides": " ".join(overrides), "mlflow.source.name": name}
-        tags["mlflow.note.content"] = f"`{' '.join([name, *overrides])}`"
+        tags = {COMMAND: name, OVERRIDES: shlex.join(overrides), "mlflow.source.name": name}
+        tags["mlflow.note.content"] = f"`{shlex.join([*name.split(), *overrides])}`"
         run_id = self._create(name, tags)
         with store.store_errors(self.uri):
             self.client.log_dict(run_id, plain(config), "config.json")
@@ -147,7 +149,9 @@ class Tracker:
             MissingRun: If there is no such run.
         """
         found = self._resolve(run)
-        stages = {name.removeprefix(MEMBER): run_id for name, run_id in found.data.tags.items() if name.startswith(MEMBER)}
+        stages = {
+            name.removeprefix(MEMBER): run_id for name, run_id in found.data.tags.items() if name.startswith(MEMBER)
+        }
         if found.data.tags.get(STAGE):
             stages[found.data.tags[STAGE]] = found.info.run_id
         artefacts: dict[str, Artefacts] = {}
@@ -162,23 +166,34 @@ class Tracker:
                     stages[tag.removeprefix(INPUT)] = source
         return artefacts
 
-    def describe(self, run: str) -> dict[str, str]:
-        """Tags of a run: command, overrides, stage."""
-        return dict(self._resolve(run).data.tags) | {"run_id": self._resolve(run).info.run_id}
+    def overrides(self, run: str) -> list[str]:
+        """What was typed after the verb of the command that a run belongs to."""
+        found = self._resolve(run)
+        parent = found.data.tags.get(PARENT)
+        tags = self.client.get_run(parent).data.tags if parent else found.data.tags
+        return shlex.split(tags.get(OVERRIDES, ""))
 
     def _resolve(self, run: str) -> "Run":
         if run == "latest":
-            runs = [found for found in self._search(f"tags.`{COMMAND}` LIKE '%'") if MEMBER + "train" in found.data.tags]
+            runs = [
+                found for found in self._search(f"tags.`{COMMAND}` LIKE '%'") if MEMBER + "train" in found.data.tags
+            ]
             if not runs:
                 raise MissingRun(run, "no finished training in the store yet. Train one first: ncds train dataset=…")
             return runs[0]
         identity = run
         if "/" in run or Path(run).exists():
-            parts = [part for part in Path(run).resolve().parts if len(part) == 32 and set(part) <= set("0123456789abcdef")]
+            parts = [
+                part for part in Path(run).resolve().parts if len(part) == 32 and set(part) <= set("0123456789abcdef")
+            ]
             if not parts:
                 raise MissingRun(run, "this path is not inside the artefacts of a run (expected …/<run id>/artifacts)")
             identity = parts[-1]
-        runs = [found for found in self._search("") if found.info.run_id.startswith(identity)] if len(identity) >= 4 else []
+        runs = (
+            [found for found in self._search("") if found.info.run_id.startswith(identity)]
+            if len(identity) >= 4
+            else []
+        )
         if not runs:
             raise MissingRun(run, "no such run in the store. `ncds ui` shows the runs; run=latest takes the newest")
         if len(runs) > 1:

@@ -127,7 +127,12 @@ def _checkpoint_if_due(
     history: History,
 ) -> None:
     if pending.signal_number is not None or (done % schedule.checkpoint_every_steps == 0 and done < schedule.steps):
-        state = {"step": done, "model": model.state_dict(), "optimiser": optimiser.state_dict(), "history": history.rows}
+        state = {
+            "step": done,
+            "model": model.state_dict(),
+            "optimiser": optimiser.state_dict(),
+            "history": history.rows,
+        }
         write_tensors(path, state)
     pending.raise_if_set()
 
@@ -146,4 +151,6 @@ def _restore(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer) -> 
 
 def _progress(start: int, steps: int) -> "tqdm[int]":
     # disable=None: silent where standard error is not a terminal
-    return tqdm(range(start, steps), "train", steps, initial=start, unit="step", file=sys.stderr, leave=False, disable=None)
+    return tqdm(
+        range(start, steps), "train", steps, initial=start, unit="step", file=sys.stderr, leave=False, disable=None
+    )

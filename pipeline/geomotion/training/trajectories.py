@@ -76,7 +76,8 @@ class TrajectoryReproduction:
 
         error = (velocity - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
         equal_time = (x[: len(paths[0])].view(targets.shape) - targets).square().sum(-1).mean()
-        losses = {"velocity": settings.velocity_weight * error}
+        size = torch.stack([parameter.square().sum() for parameter in chart.parameters()]).sum()
+        losses = {"velocity": settings.velocity_weight * error, "weights": settings.weight_penalty * size}
         if not curve_term:
             return losses | {"equal_time": settings.equal_time_warm_up_weight * equal_time}
         curve = x[len(paths[0]) :].view(*curve_times.shape, -1)
