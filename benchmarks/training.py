@@ -13,6 +13,7 @@ from geomotion import config as schema
 from geomotion import models
 from geomotion.demos import readers
 from geomotion.demos.preprocessing import preprocess
+from geomotion.dynamics.fields import ChartedField
 from geomotion.models import ModelConfig
 from geomotion.training.data import Geometry, TrainingSet
 from geomotion.training.objectives import VelocityReconstruction
@@ -22,7 +23,9 @@ from geomotion.training.trajectories import TrajectoryReproduction
 STEPS = 200
 
 
-def steps_per_second(model: ModelConfig, geometry: Geometry, objective: Objective, rate: float) -> tuple[float, float]:
+def steps_per_second(
+    model: ModelConfig, geometry: Geometry, objective: Objective[ChartedField], rate: float
+) -> tuple[float, float]:
     """Steps per second of wall time and of processor time."""
     schedule = Schedule(STEPS, rate, 50, 1.0, STEPS, STEPS, 0)
     wall, processor = time.perf_counter(), time.process_time()

@@ -12,7 +12,7 @@ LIBRARY = REPOSITORY / "pipeline/geomotion"
 
 LAYERS = (  # each may import those above it in this list, and itself
     {"errors", "types"},
-    {"files", "interrupts"},
+    {"files", "interrupts", "tables"},
     {"lie"},
     {"manifolds"},
     {"dynamics", "obstacles"},

@@ -1,11 +1,12 @@
 """The exported field as an MLflow model; logged as code, so that loading needs onnxruntime and nothing of ours."""
 
-import mlflow
 import numpy as np
 import onnxruntime
+from mlflow.models import set_model
+from mlflow.pyfunc.model import PythonModel
 
 
-class Policy(mlflow.pyfunc.PythonModel):
+class Policy(PythonModel):
     """States (batch, D) [m] to velocities [m/s]."""
 
     def load_context(self, context):  # type: ignore[no-untyped-def]
@@ -17,4 +18,4 @@ class Policy(mlflow.pyfunc.PythonModel):
         return self.session.run(None, {"state_m": np.asarray(model_input, dtype=np.float32)})[0]
 
 
-mlflow.models.set_model(Policy())
+set_model(Policy())

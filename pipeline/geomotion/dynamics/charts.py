@@ -1,5 +1,7 @@
 """Charts without learned parameters, and their composition."""
 
+from collections.abc import Callable
+
 import torch
 from torch import nn
 
@@ -95,9 +97,10 @@ class AnchoredChart(nn.Module):
         self._image = None
         return super().train(mode)
 
-    def _apply(self, *args: object, **options: object) -> "AnchoredChart":
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "AnchoredChart":
         self._image = None  # moved to another type or device
-        return super()._apply(*args, **options)  # type: ignore[arg-type]
+        super()._apply(fn, recurse)  # type: ignore[no-untyped-call]
+        return self
 
     @property
     def image(self) -> Float[Tensor, " D"]:

@@ -61,7 +61,8 @@ def matrix_exponentials(
 ) -> Float[Tensor, "*batch time D D"]:
     """e^{At} for many times, differentiable in A; in closed form for 2x2 matrices, ten times faster."""
     if len(matrix) != 2:
-        return torch.linalg.matrix_exp(matrix * times[..., None, None])
+        series: Tensor = torch.linalg.matrix_exp(matrix * times[..., None, None])
+        return series
     # A = mean I + N with N² = discriminant I (Cayley-Hamilton), so e^{At} = e^{mean t} (cosh(rt) I + sinh(rt)/r N)
     eye = torch.eye(2, dtype=matrix.dtype, device=matrix.device)
     mean = matrix.diagonal().mean()

@@ -122,7 +122,8 @@ def alternating_halves(dim: int, layers: int) -> Bool[Tensor, "layer D"]:
 def normal_frequencies(count: int, dim: int, length_scales: Sequence[float]) -> Float[Tensor, "dim count"]:
     """Quasi-random samples of N(0, I / ℓ²), which cover the spectrum more evenly than random ones."""
     seed = int(torch.randint(2**31 - 1, ()))
-    uniform = torch.quasirandom.SobolEngine(dim, scramble=True, seed=seed).draw(count, dtype=torch.float64)
+    uniform = torch.quasirandom.SobolEngine(dim, scramble=True, seed=seed).draw(count, dtype=torch.float64)  # type: ignore[no-untyped-call]
     normal = torch.special.ndtri(uniform.clamp(TAIL, 1 - TAIL))
     scales = torch.tensor(length_scales, dtype=torch.float64)[torch.arange(count) % len(length_scales)]
-    return (normal / scales[:, None]).T.float()
+    frequencies: Tensor = (normal / scales[:, None]).T.float()
+    return frequencies

@@ -15,6 +15,7 @@ from geomotion.config import DatasetConfig, GmsConfig, NcdsConfig
 from geomotion.errors import InvalidSetting, MissingRun
 from geomotion.files import read_json
 from geomotion.interrupts import interrupts_as_errors
+from geomotion.models import ModelConfig
 from geomotion.stages import compare, regression
 from geomotion.stages.evaluate import EvaluateConfig, evaluate, scores_table
 from geomotion.stages.export import ExportConfig, export
@@ -22,7 +23,6 @@ from geomotion.stages.ingest import ingest, summary_table
 from geomotion.stages.report import ReportConfig, report
 from geomotion.stages.rollout import RolloutStageConfig, rollout, rollout_table
 from geomotion.stages.train import TrainConfig, train
-from geomotion.models import ModelConfig
 from geomotion.tracking import Artefacts, Stage, Tracker, store
 from geomotion.tracking.tracker import CommandRun
 

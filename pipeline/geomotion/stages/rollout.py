@@ -34,8 +34,8 @@ class Start:
     """Where one rollout begins and at which times it is wanted."""
 
     label: str
-    state: np.ndarray  # type: ignore[type-arg]
-    times: np.ndarray  # type: ignore[type-arg]
+    state: np.ndarray
+    times: np.ndarray
 
 
 def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
@@ -87,7 +87,7 @@ def _starts(config: RolloutConfig, demonstrations: Demonstrations, skill: Skill)
     return starts
 
 
-def _state(start: list[float], dim: int) -> np.ndarray:  # type: ignore[type-arg]
+def _state(start: list[float], dim: int) -> np.ndarray:
     if len(start) != dim:
         raise InvalidSetting("rollout.starts_m", start, f"{dim} coordinates for each start")
     return np.asarray(start, dtype=float)

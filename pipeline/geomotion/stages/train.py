@@ -10,6 +10,7 @@ from geomotion import models
 from geomotion.demos import storage
 from geomotion.demos.selection import check_state_channels, split
 from geomotion.dynamics.certificate import certify
+from geomotion.dynamics.fields import ChartedField
 from geomotion.errors import InvalidSetting
 from geomotion.figures.training import save_training_figure
 from geomotion.files import atomic, write_json
@@ -58,7 +59,7 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
     save_training_figure(curves, run.folder / "figures")
 
 
-def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Objective:
+def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Objective[ChartedField]:
     match config.training:
         case schema.VelocityTraining() as velocity:
             return VelocityReconstruction(data, geometry, velocity.batch_points)

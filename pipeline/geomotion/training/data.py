@@ -28,7 +28,7 @@ class TrainingSet:
     def from_demonstrations(cls, demonstrations: Demonstrations, channels: Sequence[str]) -> "TrainingSet":
         """Single-precision tensors of the named channels."""
 
-        def tensor(values: np.ndarray) -> Tensor:  # type: ignore[type-arg]
+        def tensor(values: np.ndarray) -> Tensor:
             return torch.as_tensor(np.ascontiguousarray(values), dtype=torch.float32)
 
         return cls(

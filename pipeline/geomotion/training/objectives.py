@@ -8,7 +8,7 @@ from geomotion.training.trainer import Losses
 
 
 class VelocityReconstruction:
-    """Mean squared velocity error, Eq. (5.3), in units of the data's size and duration, plus the regulariser's own loss.
+    """Mean squared velocity error, Eq. (5.3), in units of the data's size and duration, and the regulariser's loss.
 
     Args:
         data: Demonstrated states and velocities.

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
 import torch
 from torch import Tensor, nn
@@ -15,15 +15,17 @@ from geomotion.errors import CorruptArtefact, TrainingDiverged
 from geomotion.files import write_tensors
 from geomotion.interrupts import PendingInterrupt, postponed_interrupts
 
+Model = TypeVar("Model", bound=nn.Module, contravariant=True)
+AnyModel = TypeVar("AnyModel", bound=nn.Module)
 Losses = Mapping[str, Tensor]
 Log = Callable[[int, Mapping[str, float]], None]
 
 
 @runtime_checkable
-class Objective(Protocol):
+class Objective(Protocol[Model]):
     """What a model is fitted to."""
 
-    def __call__(self, model: nn.Module, progress: float, generator: torch.Generator) -> Losses:
+    def __call__(self, model: Model, progress: float, generator: torch.Generator) -> Losses:
         """Weighted loss terms by name; the model minimises their sum.
 
         Args:
@@ -69,7 +71,7 @@ class History:
     rows: list[dict[str, float]] = field(default_factory=list)
 
 
-def fit(model: nn.Module, objective: Objective, schedule: Schedule, checkpoint: Path, log: Log) -> History:
+def fit(model: AnyModel, objective: Objective[AnyModel], schedule: Schedule, checkpoint: Path, log: Log) -> History:
     """Train a model in place, continuing from `checkpoint` if there is one.
 
     A signal is obeyed between two steps, after a checkpoint: the continued training ends in the same
@@ -94,7 +96,7 @@ def fit(model: nn.Module, objective: Objective, schedule: Schedule, checkpoint: 
 
 
 def _step(
-    model: nn.Module, objective: Objective, optimiser: torch.optim.Optimizer, schedule: Schedule, step: int
+    model: AnyModel, objective: Objective[AnyModel], optimiser: torch.optim.Optimizer, schedule: Schedule, step: int
 ) -> Losses:
     progress = step / schedule.steps
     for group in optimiser.param_groups:
@@ -104,7 +106,7 @@ def _step(
     if not torch.isfinite(total):
         raise TrainingDiverged(step, float(total.detach()))
     optimiser.zero_grad()
-    total.backward()
+    total.backward()  # type: ignore[no-untyped-call]
     nn.utils.clip_grad_norm_(model.parameters(), schedule.gradient_clip)
     optimiser.step()
     return losses

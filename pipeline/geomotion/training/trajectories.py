@@ -22,7 +22,7 @@ class Curves:
     times: Float[Tensor, "demo point"]
     states: Float[Tensor, "demo point D"]
 
-    def at(self, index: Int[Tensor, "demo *chosen"]) -> tuple[Tensor, Tensor]:
+    def at(self, index: Int[Tensor, "demo *index"]) -> tuple[Tensor, Tensor]:
         """Times and states of chosen points of each demonstration."""
         row = torch.arange(len(index)).view(-1, *(1,) * (index.ndim - 1))
         return self.times[row, index], self.states[row, index]
