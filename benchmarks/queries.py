@@ -36,21 +36,26 @@ def build(config: ModelConfig, dim: int) -> ChartedField:
     return field.requires_grad_(False)
 
 
+def row(name: str, field: ChartedField) -> str:
+    """Times of one field, and whether both ways give the same velocity."""
+    state = torch.full((1, field.dim), 0.02)
+    array = state.numpy()
+    with tempfile.TemporaryDirectory() as folder:
+        export_onnx(field, Path(folder) / "policy.onnx")
+        policy = OnnxPolicy(Path(folder) / "policy.onnx")
+    times = measure(lambda: field(state), CALLS), measure(lambda: policy(array), CALLS)
+    cells = "".join(f"{f'{median:.3f} ({spread:.3f})':>18}" for median, spread in times)
+    difference = np.abs(policy(array) - field(state).numpy()).max()
+    return f"{name:<22}{field.dim:>3}{cells}{difference:>18.1e} m/s"
+
+
 def main() -> None:
     torch.set_num_threads(1)
     print("One velocity at one state [ms]: median (interquartile range)")
     print(f"{'field':<22}{'D':>3}{'eager':>18}{'exported':>18}{'largest difference':>22}")
     for name, config in MODELS.items():
         for dim in DIMENSIONS:
-            field, state = build(config, dim), torch.full((1, dim), 0.02)
-            with tempfile.TemporaryDirectory() as folder:
-                export_onnx(field, Path(folder) / "policy.onnx")
-                policy = OnnxPolicy(Path(folder) / "policy.onnx")
-            array = state.numpy()
-            eager, exported = measure(lambda: field(state), CALLS), measure(lambda: policy(array), CALLS)
-            difference = np.abs(policy(array) - field(state).numpy()).max()
-            cells = "".join(f"{f'{median:.3f} ({spread:.3f})':>18}" for median, spread in (eager, exported))
-            print(f"{name:<22}{dim:>3}{cells}{difference:>18.1e} m/s", flush=True)
+            print(row(name, build(config, dim)), flush=True)
 
 
 if __name__ == "__main__":

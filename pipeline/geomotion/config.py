@@ -418,8 +418,8 @@ class EvaluationConfig:
 
     def __post_init__(self) -> None:
         _require_positive(
-            "evaluation", self, "contraction_grid_points", "region_starts", "region_steps", "nearby_starts", "nearby_spread",
-            "goal_tolerance", "goal_duration",
+            "evaluation", self, "contraction_grid_points", "region_starts", "region_steps", "nearby_starts",
+            "nearby_spread", "goal_tolerance", "goal_duration",
         )  # fmt: skip
         for name in ("grid_margin", "region_margin"):
             value = getattr(self, name)

@@ -87,7 +87,8 @@ class StoreUnavailable(GeomotionError):
 
     def __init__(self, uri: str, reason: str) -> None:
         super().__init__(
-            f"MLflow store {uri} cannot be used: {reason}. Set tracking.root= to another folder or tracking.uri= to another store."
+            f"MLflow store {uri} cannot be used: {reason}. "
+            "Set tracking.root= to another folder or tracking.uri= to another store."
         )
         self.uri, self.reason = uri, reason
 
@@ -97,7 +98,8 @@ class DiskFull(GeomotionError):
 
     def __init__(self, path: str | Path) -> None:
         super().__init__(
-            f"no space left while writing {path}. Free some space, or write elsewhere with tracking.root=; then repeat the command: finished stages are reused."
+            f"no space left while writing {path}. Free some space, or write elsewhere with tracking.root=; "
+            "then repeat the command: finished stages are reused."
         )
         self.path = str(path)
 

@@ -40,7 +40,7 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def write_tensors(path: Path, document: object) -> None:
-    """Write what `torch.save` takes; the same content gives the same bytes, which it does not where it knows the name."""
+    """Write what `torch.save` takes; equal content gives equal bytes, which it does not where torch knows the name."""
     import torch
 
     buffer = io.BytesIO()

@@ -28,7 +28,7 @@ class ExportConfig:
 
 
 def export(config: ExportConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
-    """Write ``policy.onnx`` and ``policy.json`` (interface, agreement with torch, query time), and log the MLflow model."""
+    """Write ``policy.onnx`` and ``policy.json`` (interface, agreement with torch, query time); log the MLflow model."""
     skill = models.load(inputs["train"].path("model.pt"))
     path = run.folder / "policy.onnx"
     export_onnx(skill.field, path)

@@ -16,6 +16,7 @@ from geomotion.dynamics.rollout import rollout as follow
 from geomotion.errors import InvalidSetting
 from geomotion.files import write_json
 from geomotion.models import Skill
+from geomotion.tables import aligned
 from geomotion.tracking import Artefacts, StageRun
 
 GOAL_TOLERANCE = 0.02  # of the size of the demonstrations
@@ -60,12 +61,11 @@ def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: St
 
 def rollout_table(document: Mapping[str, Any]) -> str:
     """Plain text: one line a rollout."""
-    lines = [f"{'start':<24} {'duration':>10} {'to goal':>10}  outcome"]
+    rows = [("start", "duration", "to goal", "outcome")]
     for row in document["rollouts"]:
-        lines.append(
-            f"{row['start']:<24} {row['duration_s']:>8.2f} s {1000 * row['distance_to_goal_m']:>7.2f} mm  {row['outcome']}"
-        )
-    return "\n".join(lines)
+        distance = f"{1000 * row['distance_to_goal_m']:.2f} mm"
+        rows.append((row["start"], f"{row['duration_s']:.2f} s", distance, row["outcome"]))
+    return aligned(rows)
 
 
 def _starts(config: RolloutConfig, demonstrations: Demonstrations, skill: Skill) -> list[Start]:
