@@ -482,10 +482,7 @@ class NcdsConfig(GmsConfig):
 def plain(value: object) -> Any:
     """Configuration objects as JSON types; each dataclass says which one it is."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {
-            "kind": type(value).__name__,
-            **{name: plain(getattr(value, name)) for name in (item.name for item in fields(value))},
-        }
+        return {"kind": type(value).__name__, **{item.name: plain(getattr(value, item.name)) for item in fields(value)}}
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, Mapping):
