@@ -6,6 +6,7 @@ send all of them back.
 
 import json
 import os
+import signal
 import sys
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
@@ -127,8 +128,12 @@ def _explain_before_job(error: Exception) -> Failure:
 
 
 def _pipeline() -> RunVerb:
-    from geomotion.stages.commands import run_verb
-
+    """Import the pipeline; Ctrl-C ends the process meanwhile, because half-imported libraries hide the exception."""
+    handler = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        from geomotion.stages.commands import run_verb
+    finally:
+        signal.signal(signal.SIGINT, handler)
     return run_verb
 
 

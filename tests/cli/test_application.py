@@ -1,6 +1,9 @@
 """One verb from the command line to the result: streams, errors, exit statuses, sweeps."""
 
 import json
+import signal
+import subprocess
+import sys
 
 import pytest
 from hydra._internal.core_plugins import basic_launcher
@@ -77,6 +80,24 @@ def test_ctrl_c_outside_of_the_pipelines_care_shows_no_traceback(command):
     assert answer.status == 130
     assert answer.err.endswith("ncds: stopped.\n")
     assert "Traceback" not in answer.err
+
+
+def test_ctrl_c_while_libraries_are_imported_ends_the_process_at_once(tmp_path):
+    script = """
+import os, signal, sys
+from geomotion_cli.dispatch import main
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == "geomotion.stages":
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+            except KeyboardInterrupt:
+                raise ImportError("half-imported")
+sys.meta_path.insert(0, Interrupting())
+main("ncds", ["train"])
+"""
+    ended = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, "", "")
 
 
 def test_a_sweep_runs_every_job_and_returns_their_objectives(command, monkeypatch):
