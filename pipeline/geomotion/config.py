@@ -388,9 +388,20 @@ class RolloutConfig:
     """What the rollout stage starts from."""
 
     demos: list[int] | None = None  # start points of these demonstrations; null: of all
-    starts_m: list[list[float]] | None = None  # or these states, one list of coordinates each
+    starts_m: list[Any] | None = None  # or these states, one list of coordinates each
     duration_s: float | None = None  # null: each demonstration's own, or their mean for `starts_m`
     points: int | None = None  # null: as many as the demonstration has
+
+    def __post_init__(self) -> None:
+        for start in self.starts_m or []:
+            numbers = isinstance(start, list) and all(isinstance(value, int | float) for value in start)
+            _require(
+                numbers, "rollout.starts_m", self.starts_m, "lists of coordinates, for example [[0.1,0.2],[0,0.3]]"
+            )
+        if self.duration_s is not None:
+            _require_positive("rollout", self, "duration_s")
+        if self.points is not None:
+            _require(self.points >= 2, "rollout.points", self.points, "2 or more")
 
 
 class Protocol(Enum):
@@ -435,6 +446,7 @@ class TrackingConfig:
     uri: str | None = None  # any other MLflow store; `root` then keeps checkpoints only
     experiment: str = "geomotion"
     register_as: str | None = None  # name in the model registry
+    ui_port: int = 5000  # of `ui`
 
 
 class Output(Enum):

@@ -9,7 +9,9 @@ def document(**values) -> dict:
 
 
 def test_every_score_of_any_run_has_a_row_and_every_run_a_column():
-    table = comparison_table(comparison({"a": document(train__dtw=1.0), "b": document(train__dtw=2.0, goal__missed=3.0)}))
+    table = comparison_table(
+        comparison({"a": document(train__dtw=1.0), "b": document(train__dtw=2.0, goal__missed=3.0)})
+    )
     head, *rows = [line.split() for line in table.splitlines()]
     assert head == ["score", "unit", "a", "(letters/j)", "b", "(letters/j)"]
     assert rows == [["train.dtw", "mm", "1", "±", "0.5", "2", "±", "0.5"], ["goal.missed", "mm", "-", "3", "±", "0.5"]]

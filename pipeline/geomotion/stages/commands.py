@@ -245,8 +245,8 @@ def _check(session: Session) -> VerbResult:
 def _ui(config: GmsConfig) -> VerbResult:
     if not store.exists(config.tracking):
         raise MissingRun("latest", f"there is no store in {config.tracking.root}/ yet. Make one with: ncds run")
-    uri = store.store_uri(config.tracking)
-    print(f"MLflow on {uri}: open http://127.0.0.1:5000/#/experiments (Ctrl-C ends it)", file=sys.stderr, flush=True)
+    uri, port = store.store_uri(config.tracking), str(config.tracking.ui_port)
+    print(f"MLflow on {uri}: open http://127.0.0.1:{port}/#/experiments (Ctrl-C ends it)", file=sys.stderr, flush=True)
     command = [
         sys.executable,
         "-m",
