@@ -245,21 +245,10 @@ def _check(session: Session) -> VerbResult:
 def _ui(config: GmsConfig) -> VerbResult:
     if not store.exists(config.tracking):
         raise MissingRun("latest", f"there is no store in {config.tracking.root}/ yet. Make one with: ncds run")
-    uri, port = store.store_uri(config.tracking), str(config.tracking.ui_port)
+    uri, port = store.store_uri(config.tracking), config.tracking.ui_port
     print(f"MLflow on {uri}: open http://127.0.0.1:{port}/#/experiments (Ctrl-C ends it)", file=sys.stderr, flush=True)
-    command = [
-        sys.executable,
-        "-m",
-        "mlflow",
-        "ui",
-        "--backend-store-uri",
-        uri,
-        "--host",
-        "127.0.0.1",
-        "--workers",
-        "1",
-    ]
-    os.execv(sys.executable, command)
+    options = [f"--backend-store-uri={uri}", "--host=127.0.0.1", f"--port={port}", "--workers=1"]
+    os.execv(sys.executable, [sys.executable, "-m", "mlflow", "ui", *options])
 
 
 def _certificate_line(certificate: dict[str, Any]) -> str:
