@@ -47,8 +47,9 @@ check: lint type test  ## everything that a change has to pass
 bench: $(STAMP)  ## time velocity queries, integration and training
 	@for script in benchmarks/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
 
-regress: $(STAMP)  ## a small pinned experiment against its stored scores
-	$(BIN)/ncds check
+regress: $(STAMP)  ## small pinned experiments against their stored scores
+	@for name in $(notdir $(basename $(wildcard conf/experiment/regression/*.yaml))); do \
+		$(BIN)/ncds check experiment=regression/$$name || exit 1; done
 
 ui: $(STAMP)  ## MLflow pages of runs/
 	$(BIN)/ncds ui

@@ -64,3 +64,10 @@ def test_a_baseline_has_to_be_named_and_to_exist(tmp_path):
         check(CheckConfig(), scores(1.0, 100.0))
     with pytest.raises(MissingData, match="missing"):
         check(CheckConfig(str(tmp_path / "missing.json")), scores(1.0, 100.0))
+
+
+def test_updating_makes_a_baseline_where_there_is_none(tmp_path):
+    path = tmp_path / "new.json"
+    check(CheckConfig(str(path), update=True), scores(2.0, 50.0))
+    assert verdicts(path, scores(2.1, 46.0)) == ["ok", "ok"]
+    assert verdicts(path, scores(2.3, 44.0)) == ["worse", "worse"]

@@ -14,6 +14,18 @@ from geomotion.errors import InvalidSetting, MissingData
 from geomotion.files import read_json, write_json
 from geomotion.tables import aligned
 
+NEW_BASELINE = {  # scores of a baseline that is made from nothing, and which way each is better
+    "train.dtwd_per_point": "lower",
+    "train.relative_velocity_error": "lower",
+    "train.end_point_error": "lower",
+    "heldout.dtwd_per_point": "lower",
+    "contraction.claimed.rate": "lower",
+    "contraction.claimed.non_contracting_fraction": "lower",
+    "region.steps_inside": "higher",
+    "goal.never_reached": "lower",
+}
+NEW_TOLERANCE = 0.1  # of the value
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -31,27 +43,40 @@ class Verdict:
 
 
 def check(config: CheckConfig, scores: Mapping[str, Any]) -> Verdict:
-    """Compare scores with the baseline, or write them into it (``check.update=true``).
+    """Compare scores with the baseline, or write them into it (``check.update=true``), making it if there is none.
 
     Raises:
         InvalidSetting: If no baseline is named.
-        MissingData: If the named file does not exist.
+        MissingData: If the named file does not exist and is not to be made.
     """
     if config.baseline is None:
         raise InvalidSetting("check.baseline", "null", "a baseline file; experiment=regression/… names its own")
     path = Path(config.baseline)
-    if not path.is_file():
-        raise MissingData(f"baseline {path}", "Run from the root of the repository, or name one with check.baseline=")
-    baseline = read_json(path)
+    baseline = _baseline(path, config.update, scores)
     rows = [_judge(name, expected, scores["scores"].get(name)) for name, expected in baseline["scores"].items()]
+    passed = config.update or all(row["verdict"] in ("ok", "better") for row in rows)
     if config.update:
         for row in rows:
             if row["now"] is not None:
                 baseline["scores"][row["name"]]["value"] = row["now"]
         write_json(path, baseline)
-    passed = config.update or all(row["verdict"] in ("ok", "better") for row in rows)
-    title = f"updated {path}" if config.update else ("nothing got worse" if passed else "WORSE than the baseline")
+    title = f"wrote {path}" if config.update else ("nothing got worse" if passed else "WORSE than the baseline")
     return Verdict(passed, f"{_table(rows)}\n\n{title}", {"passed": passed, "baseline": str(path), "rows": rows})
+
+
+def _baseline(path: Path, update: bool, scores: Mapping[str, Any]) -> dict[str, Any]:
+    if path.is_file():
+        baseline: dict[str, Any] = read_json(path)
+        return baseline
+    if not update:
+        raise MissingData(f"baseline {path}", "Make it with check.update=true, or name another with check.baseline=")
+    kept = {}
+    for name, better in NEW_BASELINE.items():
+        value = scores["scores"].get(name, {}).get("value")
+        if value is not None:
+            reason = f"{NEW_TOLERANCE:.0%} of the value when the baseline was made"
+            kept[name] = {"value": value, "better": better, "tolerance": NEW_TOLERANCE * abs(value), "reason": reason}
+    return {"scores": kept}
 
 
 def _judge(name: str, expected: Mapping[str, Any], found: Mapping[str, Any] | None) -> dict[str, Any]:
