@@ -29,7 +29,7 @@ _MODEL = {
     "field=line_integral": "the thesis' field, contraction measured only",
 }
 _TRAINING = {
-    "training.steps=1000": "optimiser steps",
+    "training.steps=4000": "optimiser steps",
     "seed=0": "the same seed, data and machine give the same result",
     "reuse=false": "repeat even what a finished run with equal settings already holds",
 }

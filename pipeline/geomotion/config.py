@@ -39,6 +39,10 @@ def _require_known(kind: str, name: str, options: tuple[str, ...]) -> None:
         raise UnknownName(kind, name, options)
 
 
+def _require_seed(prefix: str, owner: Any) -> None:
+    _require(0 <= owner.seed < 2**32, f"{prefix}seed", owner.seed, f"a whole number from 0 to {2**32 - 1}")
+
+
 def _require_positive(prefix: str, owner: object, *names: str) -> None:
     for name in names:
         value = getattr(owner, name)
@@ -160,6 +164,7 @@ class LettersDataset(DatasetConfig):
         _require_positive("dataset", self, "demos", "duration_s", "size_m")
         _require(self.points >= 2, "dataset.points", self.points, "2 or more")
         _require(0 <= self.variation <= 3, "dataset.variation", self.variation, "a number from 0 to 3")
+        _require_seed("dataset.", self)
 
 
 # ---------------------------------------------------------------- models
@@ -307,7 +312,7 @@ class StateIndependentRegulariser(RegulariserConfig):
 class TrainingConfig:
     """Shared by all objectives."""
 
-    steps: int = 4000
+    steps: int = 1000
     learning_rate: float = 1e-2  # at its highest; falls to zero along a cosine
     ramp_steps: int = 50  # over which the learning rate rises
     gradient_clip: float = 1.0
@@ -330,10 +335,10 @@ class TrajectoryTraining(TrainingConfig):
     equal_time_warm_up_weight: float = 20.0
     equal_time_weight: float = 1.0  # after the warm-up
     nearest_point_weight: float = 5.0  # squared distance between whole curves
-    nearest_point_mean_weight: float = 1.0  # distance between whole curves
+    nearest_point_mean_weight: float = 1.5  # distance between whole curves
     velocity_weight: float = 0.1
     weight_penalty: float = 1e-5  # on the chart's squared parameters
-    mixing: float = 0.5  # demonstrations are mixed in pairs by up to this share
+    mixing: float = 0.5  # similar demonstrations are mixed in pairs by up to this share
     starts: int = 4  # of each demonstration in each step
     times: int = 32  # of each start
     curve_points: int = 64
@@ -353,8 +358,9 @@ class TrajectoryTraining(TrainingConfig):
 class VelocityTraining(TrainingConfig):
     """Velocity reconstruction, Eq. (5.3)."""
 
-    batch_points: int = 512
-    learning_rate: float = 1e-3
+    steps: int = 3000
+    learning_rate: float = 3e-3
+    batch_points: int = 128
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -393,6 +399,8 @@ class RolloutConfig:
     points: int | None = None  # null: as many as the demonstration has
 
     def __post_init__(self) -> None:
+        for name in ("demos", "starts_m"):
+            _require(getattr(self, name) != [], f"rollout.{name}", [], "one start or more, or null")
         for start in self.starts_m or []:
             numbers = isinstance(start, list) and all(isinstance(value, int | float) for value in start)
             _require(
@@ -435,6 +443,7 @@ class EvaluationConfig:
         for name in ("grid_margin", "region_margin"):
             value = getattr(self, name)
             _require(value >= 0, f"evaluation.{name}", value, "0 or more")
+        _require_seed("evaluation.", self)
 
 
 # ---------------------------------------------------------------- commands
@@ -473,6 +482,9 @@ class GmsConfig:
     seed: int = 0
     reuse: bool = True
     output: Output = Output.text
+
+    def __post_init__(self) -> None:
+        _require_seed("", self)
 
 
 @dataclass

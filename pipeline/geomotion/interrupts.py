@@ -11,6 +11,14 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 HINT = "Repeat the command to continue where it stopped."
 
 
+class StopRequest(KeyboardInterrupt):
+    """A signal on its way out: no `Exception`, so that nobody takes it for damage of a file or of the store."""
+
+    def __init__(self, signal_number: int) -> None:
+        super().__init__(f"stopped by signal {signal_number}")
+        self.signal_number = signal_number
+
+
 class PendingInterrupt:
     """Set when a signal arrived inside :func:`postponed_interrupts`."""
 
@@ -25,13 +33,16 @@ class PendingInterrupt:
 
 @contextmanager
 def interrupts_as_errors() -> Iterator[None]:
-    """Raise :class:`Interrupted` where the program stands when a signal arrives (main thread only)."""
+    """Leave the block with :class:`Interrupted` when a signal arrives (main thread only)."""
 
     def handle(number: int, frame: FrameType | None) -> None:
-        raise Interrupted(number, HINT)
+        raise StopRequest(number)
 
-    with _handlers(handle):
-        yield
+    try:
+        with _handlers(handle):
+            yield
+    except StopRequest as stop:
+        raise Interrupted(stop.signal_number, HINT) from stop
 
 
 @contextmanager
@@ -41,11 +52,12 @@ def postponed_interrupts() -> Iterator[PendingInterrupt]:
 
     def handle(number: int, frame: FrameType | None) -> None:
         if pending.signal_number is not None:
-            raise Interrupted(number, HINT)
+            raise StopRequest(number)
         pending.signal_number = number
 
     with _handlers(handle):
         yield pending
+    pending.raise_if_set()  # a signal after the loop's last look
 
 
 @contextmanager

@@ -4,7 +4,7 @@ import torch
 from geomotion.config import FlowChart, LinearField, NoRegulariser, TrajectoryTraining
 from geomotion.models import ModelConfig, build
 from geomotion.training.data import Geometry, TrainingSet
-from geomotion.training.trajectories import TrajectoryReproduction, squared_distance_to_curve
+from geomotion.training.trajectories import TrajectoryReproduction, nearest_curves, squared_distance_to_curve
 
 
 @pytest.fixture
@@ -75,3 +75,10 @@ def test_distance_to_a_polyline_is_the_distance_to_its_segments():
     nearest = torch.tensor([[0, 2, 0]])
     expected = torch.tensor([[0.0625, 0.25, 1.0]])
     torch.testing.assert_close(squared_distance_to_curve(points, curve, nearest), expected)
+
+
+def test_curves_are_paired_with_those_that_are_like_them():
+    curves = torch.tensor([0.0, 1.0, 10.0, 12.0]).view(4, 1, 1).expand(4, 3, 2)
+    assert nearest_curves(curves, 1).flatten().tolist() == [1, 0, 3, 2]
+    assert nearest_curves(curves, 2).tolist() == [[1, 2], [0, 2], [3, 1], [2, 1]]
+    assert nearest_curves(curves[:1], 2).tolist() == [[0]]

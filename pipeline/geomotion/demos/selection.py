@@ -33,10 +33,12 @@ def check_state_channels(config: DatasetConfig, demonstrations: Demonstrations) 
 
     Raises:
         UnknownName: If the recordings have no such channel.
-        InvalidSetting: If no channel is chosen, or one whose time derivative is no velocity channel.
+        InvalidSetting: If no channel is chosen, one twice, or one whose time derivative is no velocity channel.
     """
     if not config.state_channels:
         raise InvalidSetting("dataset.state_channels", [], f"some of {list(demonstrations.channel_names)}")
+    if len(set(config.state_channels)) < len(config.state_channels):
+        raise InvalidSetting("dataset.state_channels", config.state_channels, "different channels")
     for name in config.state_channels:
         if name not in demonstrations.channel_names:
             raise UnknownName(f"channel of {demonstrations.name}", name, demonstrations.channel_names)

@@ -1,5 +1,6 @@
 """How well rollouts from the demonstrations' own starts reproduce them, beside what repetitions of people reach."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -112,9 +113,8 @@ def _train_baselines(trained: Sequence[Judged], reached: Score, unit: Unit) -> d
         others = [one for one in trained if one is not left_out]
         predictions.append((_nearest_velocities(left_out, others), left_out.velocities))
     return {
-        "train.dtwd_ratio": Score(
-            reached.value / float(between.mean()), "1", reached.count, reached.spread / float(between.mean()),
-            note="train.dtwd_per_point / train.dtwd_between_demos",
+        "train.dtwd_ratio": _ratio(
+            reached, float(between.mean()), "train.dtwd_per_point / train.dtwd_between_demos"
         ),
         "train.dtwd_between_demos": mean_score(between, unit.name, "baseline: every pair of training demonstrations"),
         "train.dtwd_to_nearest_demo": mean_score(
@@ -135,9 +135,8 @@ def _heldout_baselines(
     )
     predictions = [(_nearest_velocities(one, trained), one.velocities) for one in heldout]
     return {
-        "heldout.ratio_to_nearest_demo": Score(
-            reached.value / float(nearest.mean()), "1", reached.count, reached.spread / float(nearest.mean()),
-            note="heldout.dtwd_per_point / heldout.dtwd_to_nearest_demo",
+        "heldout.ratio_to_nearest_demo": _ratio(
+            reached, float(nearest.mean()), "heldout.dtwd_per_point / heldout.dtwd_to_nearest_demo"
         ),
         "heldout.dtwd_to_nearest_demo": mean_score(
             nearest, unit.name, "baseline: the nearest training demonstration in place of the rollout"
@@ -147,6 +146,12 @@ def _heldout_baselines(
             curves.relative_error, predictions, "1", "baseline: nearest state of the training demonstrations"
         ),
     }  # fmt: skip
+
+
+def _ratio(reached: Score, baseline: float, note: str) -> Score:
+    """A distance as a multiple of a baseline; not finite where demonstrations do not differ."""
+    unit = baseline or math.nan
+    return Score(reached.value / unit, "1", reached.count, reached.spread / unit, note=note)
 
 
 def _averaged_demo_score(judged: Sequence[Judged], trained: Sequence[Judged], unit: Unit) -> Score:

@@ -57,7 +57,11 @@ def run_verb(verb: str, config: GmsConfig, overrides: list[str]) -> VerbResult:
     torch.set_num_threads(1)  # the networks are small: a second thread costs up to twenty times what it gives
     if verb == "ui":
         return _ui(config)
-    with interrupts_as_errors(), _session(f"{program} {verb}", config, overrides) as session:
+    with (
+        interrupts_as_errors(),
+        store.database_errors(store.store_uri(config.tracking)),
+        _session(f"{program} {verb}", config, overrides) as session,
+    ):
         return VERBS[verb](session)
 
 

@@ -1,5 +1,6 @@
 """Trajectories of a trained field that a robot can execute."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -45,7 +46,11 @@ def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: St
     demonstrations = storage.load(inputs["ingest"].folder)
     starts = _starts(config.rollout, demonstrations, skill)
     outcomes = [_follow(skill, start, config.solver) for start in starts]
-    trajectories = tuple(_trajectory(skill, start, outcome) for start, outcome in zip(starts, outcomes, strict=True))
+    pairs = zip(starts, outcomes, strict=True)
+    trajectories = tuple(found for start, outcome in pairs if (found := _trajectory(skill, start, outcome)) is not None)
+    if not trajectories:
+        labels = ", ".join(start.label for start in starts)
+        raise InvalidSetting("rollout", labels, "a start from which the trajectory stays finite for two points")
     storage.save(
         replace(
             demonstrations,
@@ -63,7 +68,8 @@ def rollout_table(document: Mapping[str, Any]) -> str:
     """Plain text: one line a rollout."""
     rows = [("start", "duration", "to goal", "outcome")]
     for row in document["rollouts"]:
-        distance = f"{1000 * row['distance_to_goal_m']:.2f} mm"
+        metres = row["distance_to_goal_m"]
+        distance = "infinite" if metres is None else f"{1000 * metres:.2f} mm"
         rows.append((row["start"], f"{row['duration_s']:.2f} s", distance, row["outcome"]))
     return aligned(rows)
 
@@ -108,13 +114,19 @@ def _follow(skill: Skill, start: Start, solver: SolverConfig) -> Rollout:
     )
 
 
-def _trajectory(skill: Skill, start: Start, outcome: Rollout) -> Trajectory:
+def _trajectory(skill: Skill, start: Start, outcome: Rollout) -> Trajectory | None:
+    """What a robot can execute of a rollout: all points before the first that is not finite, if they are two."""
     states = outcome.states[0]
     with torch.no_grad():
         velocities = skill.field(states)
+    is_finite = torch.cat([states, velocities], dim=-1).isfinite().all(dim=-1)
+    points = int(is_finite.int().cumprod(0).sum())
+    if points < 2:
+        return None
+    states, velocities = states[:points], velocities[:points]
     channel = skill.state_channels[0]
     return Trajectory(
-        start.times,
+        start.times[:points],
         {channel: states.double().numpy(), VELOCITY_OF[channel]: velocities.double().numpy()},
         start.label,
     )
@@ -123,6 +135,7 @@ def _trajectory(skill: Skill, start: Start, outcome: Rollout) -> Trajectory:
 def _document(skill: Skill, starts: list[Start], outcomes: list[Rollout]) -> dict[str, Any]:
     rows = []
     for start, outcome in zip(starts, outcomes, strict=True):
+        distance = float((outcome.states[0, -1] - skill.goal).norm())
         rows.append(
             {
                 "start": start.label,
@@ -130,7 +143,7 @@ def _document(skill: Skill, starts: list[Start], outcomes: list[Rollout]) -> dic
                 "points": len(start.times),
                 "status": outcome.statuses[0].name,
                 "outcome": outcome.statuses[0].value,
-                "distance_to_goal_m": float((outcome.states[0, -1] - skill.goal).norm()),
+                "distance_to_goal_m": distance if math.isfinite(distance) else None,
                 "method": outcome.method,
                 "note": outcome.note,
             }

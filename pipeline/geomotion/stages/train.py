@@ -11,7 +11,7 @@ from geomotion.demos import storage
 from geomotion.demos.selection import check_state_channels, split
 from geomotion.dynamics.certificate import certify
 from geomotion.dynamics.fields import ChartedField
-from geomotion.errors import InvalidSetting
+from geomotion.errors import DatasetError, InvalidSetting
 from geomotion.figures.training import save_training_figure
 from geomotion.files import atomic, write_json
 from geomotion.models import ModelConfig, Skill
@@ -40,13 +40,22 @@ class TrainConfig:
 
 
 def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
-    """Write ``model.pt``, ``certificate.json``, ``training.csv`` and its picture."""
+    """Write ``model.pt``, ``certificate.json``, ``training.csv`` and its picture.
+
+    Raises:
+        DatasetError: If nothing moves in the demonstrations.
+        InvalidSetting: If settings do not go together, or do not fit the demonstrations.
+        TrainingDiverged: If a loss or a parameter becomes infinite.
+        Interrupted: If a signal arrived.
+    """
     demonstrations = storage.load(inputs["ingest"].folder)
     check_state_channels(config.selection, demonstrations)
     train_demos, test_demos = split(config.selection, demonstrations)
     channels = tuple(config.selection.state_channels)
     data = TrainingSet.from_demonstrations(demonstrations.select(train_demos), channels)
     geometry = Geometry.of(data)
+    if geometry.scale_m == 0:
+        raise DatasetError(demonstrations.name, "the training demonstrations stay where they start; expected motion")
     field = models.build(config.model, geometry)
     history = fit(field, _objective(config, data, geometry), _schedule(config), run.checkpoint, run.log_series)
 

@@ -2,7 +2,8 @@
 
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,6 +43,17 @@ class StageRun:
         self._pending += [(name, float(value), step) for name, value in values.items()]
         if len(self._pending) >= FLUSH_AT:
             self.flush()
+
+    @contextmanager
+    def flushed(self) -> Iterator[None]:
+        """Send what the block logged, also if it fails; its error is then the one to report."""
+        try:
+            yield
+        except BaseException:
+            with suppress(Exception):
+                self.flush()
+            raise
+        self.flush()
 
     def flush(self) -> None:
         """Send what is buffered."""

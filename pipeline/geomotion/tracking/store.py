@@ -36,18 +36,32 @@ def exists(config: TrackingConfig) -> bool:
 
 
 @contextmanager
-def store_errors(uri: str) -> Iterator[None]:
-    """Turn what MLflow, SQLAlchemy and the file system raise about the store into one clear error."""
-    from mlflow.exceptions import MlflowException
-    from sqlalchemy.exc import SQLAlchemyError
-
+def database_errors(uri: str) -> Iterator[None]:
+    """Turn what MLflow and SQLAlchemy raise, and a full disk, into one clear error."""
     try:
         yield
-    except (MlflowException, SQLAlchemyError, sqlite3.Error) as error:
-        raise StoreUnavailable(uri, _reason(error)) from error
     except OSError as error:
         if is_disk_full(error):
             raise DiskFull(error.filename or uri) from error
+        raise
+    except Exception as error:
+        from mlflow.exceptions import MlflowException
+        from sqlalchemy.exc import SQLAlchemyError
+
+        if not isinstance(error, MlflowException | SQLAlchemyError | sqlite3.Error):
+            raise
+        if "disk is full" in str(error):
+            raise DiskFull(uri) from error
+        raise StoreUnavailable(uri, _reason(error)) from error
+
+
+@contextmanager
+def store_errors(uri: str) -> Iterator[None]:
+    """As :func:`database_errors`, for blocks in which the file system, too, is asked for the store only."""
+    try:
+        with database_errors(uri):
+            yield
+    except OSError as error:
         raise StoreUnavailable(uri, error.strerror or str(error)) from error
 
 
@@ -59,7 +73,6 @@ def _reason(error: Exception) -> str:
         ("malformed", "the database is damaged"),
         ("readonly", "the database is read-only"),
         ("unable to open", "the database cannot be opened"),
-        ("disk is full", "the disk is full"),
         ("out-of-date database schema", "it was made by another MLflow version; run `mlflow db upgrade` on it"),
     ):
         if sign in text:
@@ -107,6 +120,7 @@ def _prepare(path: Path) -> None:
 def _quiet() -> None:
     os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")  # its own 7 take minutes where no server answers
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     os.environ.setdefault("MLFLOW_SQLALCHEMYSTORE_POOLCLASS", "NullPool")
     for name in ("mlflow", "alembic", "mlflow.store.db.utils"):

@@ -4,7 +4,6 @@ import json
 import logging
 import shlex
 import shutil
-import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlparse
 
-from filelock import FileLock
+from filelock import FileLock, Timeout
 
 from geomotion.config import TrackingConfig, plain
 from geomotion.errors import GeomotionError, Interrupted, MissingRun
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
 
 COMMAND, STAGE, KEY, DIGEST, ERROR = (f"geomotion.{name}" for name in ("command", "stage", "key", "digest", "error"))
 OVERRIDES = "geomotion.overrides"
+SAME = "geomotion.same_as"  # an older run whose artefacts stand for those of this one
 INPUT = "geomotion.input."
 MEMBER = "geomotion.stage."
 PARENT = "mlflow.parentRunId"
@@ -87,7 +87,7 @@ class Tracker:
         for artefacts in inputs.values():
             artefacts.verify()
         key = run_key(stage.name, config, inputs)
-        with FileLock(self.work / f"{key}.lock"):
+        with self._computing(stage.name, key):
             found = self._finished(key) if self.reuse and not stage.reads_outside else None
             if found is None:
                 begun = time.monotonic()
@@ -97,6 +97,20 @@ class Tracker:
                 logger.info("%s: reused run %s", stage.name, found.run_id[:8])
         self.link(parent, {stage.name: found})
         return found
+
+    @contextmanager
+    def _computing(self, stage: str, key: str) -> Iterator[None]:
+        """Nobody else computes this key meanwhile."""
+        lock = FileLock(self.work / f"{key}.lock")
+        try:
+            lock.acquire(blocking=False)
+        except Timeout:
+            logger.info("%s: waiting for another command that computes the same", stage)
+            lock.acquire()
+        try:
+            yield
+        finally:
+            lock.release()
 
     def link(self, command: CommandRun, stages: Mapping[str, Artefacts]) -> None:
         """Note that finished stages belong to a command."""
@@ -120,22 +134,33 @@ class Tracker:
             tags = {STAGE: stage.name, KEY: key, PARENT: parent.run_id, "mlflow.source.name": parent.name}
             run_id = self._create(stage.name, tags | {INPUT + name: found.run_id for name, found in inputs.items()})
             self._log_parameters(run_id, config)
-        with self._ending(run_id), tempfile.TemporaryDirectory(dir=self.work, prefix=f"{stage.name}-") as name:
-            run = StageRun(Path(name), checkpoint, self.client, run_id)
+        with self._ending(run_id), self._scratch(key) as folder:
+            run = StageRun(folder, checkpoint, self.client, run_id)
             write_json(run.folder / "config.json", plain(config))
             write_json(run.folder / "environment.json", environment())
-            stage.function(config, inputs, run)
+            with run.flushed():
+                stage.function(config, inputs, run)
             digest = digest_of(run.folder)
             same = self._finished(key, digest) if self.reuse and stage.reads_outside else None
             if same is not None:
-                self.client.set_tag(run_id, "geomotion.same_as", same.run_id)
+                self.client.set_tag(run_id, SAME, same.run_id)
                 return same
             with store.store_errors(self.uri):
-                run.flush()
-                self.client.log_artifacts(run_id, name)
+                self.client.log_artifacts(run_id, str(folder))
                 self.client.set_tag(run_id, DIGEST, digest)
         checkpoint.unlink(missing_ok=True)
         return self._artefacts(self.client.get_run(run_id))
+
+    @contextmanager
+    def _scratch(self, key: str) -> Iterator[Path]:
+        """An empty folder for the outputs of a stage; what a killed process left there is removed first."""
+        folder = self.work / f"{key}.outputs"
+        shutil.rmtree(folder, ignore_errors=True)
+        try:
+            folder.mkdir()
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
 
     # ------------------------------------------------------------ looking runs up
     def lineage(self, run: str) -> dict[str, Artefacts]:
@@ -158,8 +183,12 @@ class Tracker:
         while stages:
             name, run_id = stages.popitem()
             member = self.client.get_run(run_id)
+            if SAME in member.data.tags:
+                member = self.client.get_run(member.data.tags[SAME])
             if member.info.status != "FINISHED":
                 raise MissingRun(run, f"its stage {name!r} is {member.info.status.lower()}, not finished")
+            if DIGEST not in member.data.tags:
+                raise MissingRun(run, f"its stage {name!r} left no artefacts")
             artefacts[name] = self._artefacts(member)
             for tag, source in member.data.tags.items():
                 if tag.startswith(INPUT) and tag.removeprefix(INPUT) not in artefacts:

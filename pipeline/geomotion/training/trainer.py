@@ -1,5 +1,6 @@
 """The one training loop: fixed number of steps, seeded by step, checkpointed, resumed to the same result."""
 
+import logging
 import math
 import sys
 from collections.abc import Callable, Mapping
@@ -14,6 +15,8 @@ from tqdm import tqdm
 from geomotion.errors import CorruptArtefact, TrainingDiverged
 from geomotion.files import write_tensors
 from geomotion.interrupts import PendingInterrupt, postponed_interrupts
+
+logger = logging.getLogger(__name__)
 
 Model = TypeVar("Model", bound=nn.Module, contravariant=True)
 AnyModel = TypeVar("AnyModel", bound=nn.Module)
@@ -78,12 +81,14 @@ def fit(model: AnyModel, objective: Objective[AnyModel], schedule: Schedule, che
     parameters as an uninterrupted one.
 
     Raises:
-        TrainingDiverged: If a loss is not finite.
+        TrainingDiverged: If a loss or a parameter is not finite.
         Interrupted: If a signal arrived.
         CorruptArtefact: If the checkpoint cannot be read.
     """
     optimiser = torch.optim.Adam(model.parameters(), schedule.learning_rate, fused=True)
     start, history = _restore(checkpoint, model, optimiser)
+    if start > 0:
+        logger.info("train: continues at step %d of %d", start, schedule.steps)
     model.train()
     with postponed_interrupts() as pending:
         for step in _progress(start, schedule.steps):
@@ -91,6 +96,8 @@ def fit(model: AnyModel, objective: Objective[AnyModel], schedule: Schedule, che
             if step % schedule.log_every_steps == 0 or step == schedule.steps - 1:
                 history.rows.append(_record(step, losses, optimiser, log))
             _checkpoint_if_due(checkpoint, step + 1, schedule, pending, model, optimiser, history)
+    if not all(parameter.isfinite().all() for parameter in model.parameters()):  # by the last step, whose loss was
+        raise TrainingDiverged(schedule.steps, math.nan)
     model.eval()
     return history
 

@@ -12,6 +12,7 @@ from geomotion.training.data import Geometry, TrainingSet
 from geomotion.training.trainer import Losses
 from geomotion.types import Float, Int, Tensor
 
+MIXING_PARTNERS = 2  # mixing with any other one makes up motions nobody would make where there are several ways
 ROUNDING = 1e-6  # keeps the root of a squared distance differentiable at 0
 
 
@@ -32,8 +33,8 @@ class TrajectoryReproduction:
     """Distance between demonstrations and trajectories from their own states, at equal times and as curves.
 
     Each step draws starts on the demonstrations, the first of them their beginnings, and times after each. Half of the
-    starts lie on mixtures of two demonstrations, x_i + λ (x_j - x_i), which stand for the repetitions that a person did
-    not show: without them the field learns the starts of the training set by heart. After a warm-up, the nearest-point
+    starts lie on mixtures of two similar demonstrations, x_i + λ (x_j - x_i), which stand for the repetitions that a
+    person did not show: without them the field learns the starts of the training set by heart. After a warm-up, the nearest-point
     term compares whole curves, which lets the shape count more than the timing.
 
     Args:
@@ -48,6 +49,8 @@ class TrajectoryReproduction:
         self.duration_s = geometry.duration_s
         self.centre = torch.tensor(geometry.centre)
         self.curves = self._common_length(data)
+        self.partners = nearest_curves(self.curves.states, MIXING_PARTNERS)
+        self.curve_stride = min(settings.curve_stride, self.curves.times.shape[1] // 2)  # a curve has two points
         self.states = data.all_states
         self.velocities = data.all_velocities
         self.mean_square_speed = self.velocities.square().sum(-1).mean()
@@ -76,15 +79,16 @@ class TrajectoryReproduction:
 
         error = (velocity - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
         equal_time = (x[: len(paths[0])].view(targets.shape) - targets).square().sum(-1).mean()
-        size = torch.stack([parameter.square().sum() for parameter in chart.parameters()]).sum()
+        squares = [parameter.square().sum() for parameter in chart.parameters()]
+        size = torch.stack(squares).sum() if squares else torch.zeros(())
         losses = {"velocity": settings.velocity_weight * error, "weights": settings.weight_penalty * size}
         if not curve_term:
             return losses | {"equal_time": settings.equal_time_warm_up_weight * equal_time}
         curve = x[len(paths[0]) :].view(*curve_times.shape, -1)
-        phase = int(torch.randint(settings.curve_stride, (), generator=generator))
+        phase = int(torch.randint(self.curve_stride, (), generator=generator))
         return losses | {
             "equal_time": settings.equal_time_weight * equal_time,
-            "nearest_point": self._nearest_point(curve, followed.states[:, phase :: settings.curve_stride]),
+            "nearest_point": self._nearest_point(curve, followed.states[:, phase :: self.curve_stride]),
         }
 
     def _common_length(self, data: TrainingSet) -> Curves:
@@ -105,10 +109,11 @@ class TrajectoryReproduction:
         return states * self.scale_m + self.centre
 
     def _mix(self, generator: torch.Generator) -> Curves:
-        """Each demonstration moved towards, or away from, another one."""
+        """Each demonstration moved towards, or away from, one that is like it."""
         curves = self.curves
         share = self.settings.mixing * (2 * torch.rand(len(curves.times), 1, generator=generator) - 1)
-        other = torch.randperm(len(curves.times), generator=generator)
+        choice = torch.randint(self.partners.shape[1], (len(curves.times),), generator=generator)
+        other = self.partners[torch.arange(len(curves.times)), choice]
         return Curves(
             curves.times + share * (curves.times[other] - curves.times),
             curves.states + share[..., None] * (curves.states[other] - curves.states),
@@ -153,6 +158,13 @@ class TrajectoryReproduction:
         mean = (there + ROUNDING).sqrt().mean() + (back + ROUNDING).sqrt().mean()
         square = there.mean() + back.mean()
         return self.settings.nearest_point_weight * square + self.settings.nearest_point_mean_weight * mean
+
+
+def nearest_curves(curves: Float[Tensor, "demo point D"], count: int) -> Int[Tensor, "demo partner"]:
+    """For each curve the `count` others, or as many as there are, that are nearest point by point; itself if alone."""
+    distance = (curves[:, None] - curves).norm(dim=-1).mean(-1)
+    distance.fill_diagonal_(torch.inf)
+    return distance.argsort(1)[:, : max(1, min(count, len(curves) - 1))]
 
 
 def squared_distance_to_curve(

@@ -83,6 +83,8 @@ def _require_all_axes(path: Path, axes: Iterable[str]) -> None:
 
 
 def _numbers(path: Path, name: str, values: NDArray[Any]) -> Array:
+    if values.dtype.kind in "Mmc":  # dates, durations and complex numbers would be cast without a word
+        raise DatasetError(path, f"{name} holds {values.dtype}; expected numbers in the unit of the column")
     try:
         return np.asarray(values, dtype=np.float64)
     except (ValueError, TypeError) as error:
