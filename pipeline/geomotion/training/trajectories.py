@@ -12,7 +12,7 @@ from geomotion.training.data import Geometry, TrainingSet
 from geomotion.training.trainer import Losses
 from geomotion.types import Float, Int, Tensor
 
-MIXING_PARTNERS = 2  # mixing with any other one makes up motions nobody would make where there are several ways
+MIXING_PARTNERS = 2  # mixtures with any other one would be motions that nobody makes, where there are several ways
 ROUNDING = 1e-6  # keeps the root of a squared distance differentiable at 0
 
 
@@ -164,7 +164,8 @@ def nearest_curves(curves: Float[Tensor, "demo point D"], count: int) -> Int[Ten
     """For each curve the `count` others, or as many as there are, that are nearest point by point; itself if alone."""
     distance = (curves[:, None] - curves).norm(dim=-1).mean(-1)
     distance.fill_diagonal_(torch.inf)
-    return distance.argsort(1)[:, : max(1, min(count, len(curves) - 1))]
+    order: Tensor = distance.argsort(1)
+    return order[:, : max(1, min(count, len(curves) - 1))]
 
 
 def squared_distance_to_curve(
