@@ -34,8 +34,8 @@ class TrajectoryReproduction:
 
     Each step draws starts on the demonstrations, the first of them their beginnings, and times after each. Half of the
     starts lie on mixtures of two similar demonstrations, x_i + λ (x_j - x_i), which stand for the repetitions that a
-    person did not show: without them the field learns the starts of the training set by heart. After a warm-up, the nearest-point
-    term compares whole curves, which lets the shape count more than the timing.
+    person did not show: without them the field learns the starts of the training set by heart. After a warm-up, the
+    nearest-point term compares whole curves, which lets the shape count more than the timing.
 
     Args:
         data: Demonstrations.
