@@ -1,0 +1,1 @@
+"""Obstacles in state space, and fields that flow around them."""

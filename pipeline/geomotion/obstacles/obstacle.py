@@ -1,0 +1,75 @@
+"""What an obstacle is, and what can be said of every one."""
+
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
+
+import torch
+
+from geomotion.types import Float, State, Tensor, Times
+
+BISECTIONS = 60  # halves an interval until neighbouring double-precision numbers
+
+
+@runtime_checkable
+class Obstacle(Protocol):
+    """A solid body that every ray from its reference point leaves exactly once (star-shaped).
+
+    Attributes:
+        dim: D.
+        reference: Point inside it at time zero, shape (D,) [m].
+        inradius: Radius of a ball around the reference point that it contains [m].
+        velocity: Its constant velocity, shape (D,) [m/s].
+    """
+
+    dim: int
+    reference: Tensor
+    inradius: float
+    velocity: Tensor
+
+    def signed_distance(self, x: State) -> Float[Tensor, "*batch"]:
+        """Distance to the surface [m], negative inside; differentiable outside."""
+        ...
+
+    def level(self, x: State) -> Float[Tensor, "*batch"]:
+        """Γ(x): one at the surface, growing along every ray from the reference point, C¹ outside.
+
+        Source: Huber et al. (2022); Thesis Sec. 5.4.
+        """
+        ...
+
+    def normal(self, x: State) -> State:
+        """∇Γ/‖∇Γ‖, the unit normal of the level set of Γ through x, pointing away from the obstacle."""
+        ...
+
+
+def surface_points(obstacle: Obstacle, directions: Float[Tensor, "*batch D"]) -> Float[Tensor, "*batch D"]:
+    """Where rays from the reference point leave the obstacle.
+
+    Args:
+        obstacle: Star-shaped about its reference point, at time zero.
+        directions: Unit vectors.
+    """
+    low = torch.full_like(directions[..., :1], obstacle.inradius)
+    high = 2 * low
+    while bool((obstacle.level(obstacle.reference + high * directions) < 1).any()):
+        high = 2 * high
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        is_inside = (obstacle.level(obstacle.reference + middle * directions) < 1)[..., None]
+        low, high = torch.where(is_inside, middle, low), torch.where(is_inside, high, middle)
+    return obstacle.reference + high * directions
+
+
+def clearance(
+    obstacles: Sequence[Obstacle], states: Float[Tensor, "*batch time D"], times: Times
+) -> Float[Tensor, "*batch"]:
+    """Smallest signed distance between a trajectory and the obstacles, which move meanwhile [m].
+
+    Args:
+        obstacles: One or more.
+        states: Trajectories.
+        times: Times since the obstacles were where their reference points say [s].
+    """
+    shifted = (states - times[:, None] * obstacle.velocity for obstacle in obstacles)
+    distances = [obstacle.signed_distance(x) for obstacle, x in zip(obstacles, shifted, strict=True)]
+    return torch.stack(distances).amin(dim=0).amin(dim=-1)
