@@ -9,7 +9,16 @@ import torch
 
 from geomotion.dynamics.fields import ChartedField
 from geomotion.dynamics.linear import LinearField
+from geomotion.dynamics.potential import PotentialField
 from geomotion.types import Float, States, Tensor
+
+PROOFS: Mapping[type, str] = {
+    LinearField: "The field is linear in the coordinates z = ψ(x), and the symmetric part of its matrix is at most -τI "
+    "for every value of its parameters.",
+    PotentialField: "In the coordinates z = ψ(x) the field is the negative gradient of a strongly convex function plus "
+    "a constant rotation: the symmetric part of its Jacobian is at most -τI everywhere, for every value of its "
+    "parameters.",
+}
 
 
 class Claim(Enum):
@@ -69,13 +78,12 @@ def certify(model: ChartedField, states: States) -> Certificate:
         states: Demonstrated states [m], where the overshoot is evaluated.
     """
     overshoot = chart_distortion(model, states)
-    if isinstance(model.field, LinearField):
+    if isinstance(model.field, LinearField | PotentialField):
         return Certificate(
             Claim.by_construction,
             "M(x) = Dψ(x)ᵀDψ(x), the pullback of the Euclidean metric through the chart ψ",
             model.field.rate / model.time_unit_s,
-            "The field is linear in the coordinates z = ψ(x), and the symmetric part of its matrix is at most -τI for "
-            "every value of its parameters.",
+            PROOFS[type(model.field)],
             overshoot,
         )
     return Certificate(
