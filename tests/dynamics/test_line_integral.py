@@ -11,8 +11,13 @@ from torch.testing import assert_close
 
 from geomotion.dynamics.line_integral import DormandPrince, LineIntegralField, RungeKutta4
 from geomotion.dynamics.quadrature import GaussLegendre
-from geomotion.dynamics.regularisers import ConstantRegulariser, StateIndependentRegulariser
-from geomotion.networks.mlp import JacobianRoot
+from geomotion.dynamics.regularisers import (
+    ConstantRegulariser,
+    EigenvalueRegulariser,
+    StateDependentRegulariser,
+    StateIndependentRegulariser,
+)
+from geomotion.networks.mlp import MLP, JacobianRoot, SkewMatrix
 
 EPSILON = 0.05
 BATCHES = [(), (3,), (2, 3)]
@@ -29,21 +34,29 @@ class PolynomialRoot(nn.Module):
         return self.constant + x[..., :1, None] * self.slope
 
 
-def random_field(dim: int, seed: int = 0, integrator=None, gain: float = 2.0, regulariser=None) -> LineIntegralField:
+def random_field(
+    dim: int, seed: int = 0, integrator=None, gain: float = 2.0, regulariser=None, skew: bool = False
+) -> LineIntegralField:
     """A random tanh network with weights `gain` times the usual ones, in double precision."""
     torch.manual_seed(seed)
     root = JacobianRoot(dim, [24, 24])
+    skew_part = SkewMatrix(dim, [24]) if skew else None
     with torch.no_grad():
-        for parameter in root.parameters():
+        for parameter in (*root.parameters(), *(skew_part.parameters() if skew_part else ())):
             parameter.mul_(gain)
     regulariser = regulariser or ConstantRegulariser(EPSILON, dim)
     base_point, base_velocity = torch.randn(dim), nn.Parameter(torch.randn(dim))
-    return LineIntegralField(root, regulariser, base_point, base_velocity, integrator or GaussLegendre(40)).double()
+    integrator = integrator or GaussLegendre(40)
+    return LineIntegralField(root, regulariser, base_point, base_velocity, integrator, skew_part).double()
 
 
 def with_integrator(field: LineIntegralField, integrator) -> LineIntegralField:
     parts = (field.jacobian_root, field.regulariser, field.base_point, field.base_velocity)
-    return LineIntegralField(*parts, integrator).double()
+    return LineIntegralField(*parts, integrator, field.skew_part).double()
+
+
+def symmetric_part(matrix: torch.Tensor) -> torch.Tensor:
+    return (matrix + matrix.mT) / 2
 
 
 def states(*shape: int, seed: int = 1) -> torch.Tensor:
@@ -96,10 +109,37 @@ def test_contraction_jacobian_is_symmetric_and_at_most_minus_epsilon(dim, seed):
 
 
 @pytest.mark.parametrize("seed", range(10))
-@pytest.mark.parametrize("dim", [1, 2, 5])
-def test_the_field_pulls_every_state_towards_the_base_point(dim, seed):
+@pytest.mark.parametrize("dim", [2, 3, 5])
+def test_the_skew_part_leaves_the_symmetric_part_and_every_quadratic_form_alone(dim, seed):
+    field = random_field(dim, seed, gain=3.0, skew=True)
+    x, v = states(50, dim), states(50, dim, seed=2).unsqueeze(-1)
+    jacobian = field.contraction_jacobian(x)
+    field.skew_part = None
+    without = field.contraction_jacobian(x)
+    assert (jacobian - jacobian.mT).abs().max() > 0.1
+    assert_close(symmetric_part(jacobian), without)
+    assert_close(v.mT @ jacobian @ v, v.mT @ without @ v)
+    assert torch.linalg.eigvalsh(symmetric_part(jacobian)).max() <= -EPSILON + 1e-8
+
+
+@pytest.mark.parametrize("skew", [False, True])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_network_of_epsilon_bounds_the_symmetric_part_at_every_state(seed, skew):
+    torch.manual_seed(seed)
+    field = random_field(3, seed, regulariser=StateDependentRegulariser(MLP(3, 3, [16]), 1e-3, 10.0), skew=skew)
+    x = states(50, 3)
+    largest = torch.linalg.eigvalsh(symmetric_part(field.contraction_jacobian(x)))[:, -1]
+    smallest_epsilon = field.regulariser(x).amin(-1)
+    assert (largest <= -smallest_epsilon + 1e-10).all()
+    assert smallest_epsilon.std() > 0
+
+
+@pytest.mark.parametrize("skew", [False, True])
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("dim", [2, 5])
+def test_the_field_pulls_every_state_towards_the_base_point(dim, seed, skew):
     # Positive weights make the inequality exact for any number of nodes.
-    field = random_field(dim, seed, GaussLegendre(5), gain=3.0)
+    field = random_field(dim, seed, GaussLegendre(5), gain=3.0, skew=skew)
     offset = states(200, dim)
     change = field(field.base_point + offset) - field(field.base_point)
     squared = offset.square().sum(-1)
@@ -116,6 +156,24 @@ def test_a_vector_epsilon_bounds_each_axis():
     jacobian = field.contraction_jacobian(states(5, 2))
     root = field.jacobian_root(states(5, 2))
     assert_close(-jacobian - root.mT @ root, field.regulariser.epsilon.diag().expand(5, 2, 2))
+
+
+def test_a_constant_skew_part_adds_its_linear_field():
+    field, x = random_field(3, skew=True), states(5, 3)
+    field.skew_part.network.double().start_at(states(3, seed=7))
+    skew = field.skew_part(field.base_point)
+    velocity = field(x)
+    field.skew_part = None
+    assert_close(velocity - field(x), (x - field.base_point) @ skew.T)
+
+
+def test_regularisation_of_eigenvalues_reaches_the_network_and_not_the_skew_part():
+    field = random_field(2, gain=1.0, regulariser=EigenvalueRegulariser(EPSILON, 2, 1.0, 10.0), skew=True)
+    loss = field.regularisation(states(20, 2))
+    loss.backward()
+    assert loss < 0
+    assert all(parameter.grad.abs().max() > 0 for parameter in field.jacobian_root.parameters())
+    assert all(parameter.grad.abs().max() < 1e-12 for parameter in field.skew_part.parameters())
 
 
 # ---------------------------------------------------------------- what does not hold
@@ -161,9 +219,9 @@ def test_dormand_prince_stays_near_its_tolerance(tolerance):
 
 
 @pytest.mark.parametrize("batch", BATCHES)
-@pytest.mark.parametrize("dim", [1, 2, 8])
-def test_integrators_agree_for_any_batch(dim, batch):
-    field, x = random_field(dim, gain=1.0), states(*batch, dim)
+@pytest.mark.parametrize(("dim", "skew"), [(1, False), (2, True), (8, False), (8, True)])
+def test_integrators_agree_for_any_batch(dim, skew, batch):
+    field, x = random_field(dim, gain=1.0, skew=skew), states(*batch, dim)
     for integrator in (RungeKutta4(100), DormandPrince(1e-9, 1e-9)):
         assert_close(with_integrator(field, integrator)(x), field(x), rtol=1e-6, atol=1e-6)
 

@@ -77,6 +77,35 @@ def test_a_loss_that_is_not_finite_stops_the_training(tmp_path):
         fit(model(), explode, schedule(), tmp_path / "checkpoint", ignore)
 
 
+class Steep(torch.autograd.Function):
+    """Zero, with a slope of choice."""
+
+    @staticmethod
+    def forward(ctx, value, slope):
+        ctx.slope = slope
+        return value * 0
+
+    @staticmethod
+    def backward(ctx, gradient):
+        return gradient * ctx.slope, None
+
+
+def test_parameters_that_the_last_step_ruins_stop_the_training(tmp_path):
+    def ruin(model, progress, generator):
+        return {"loss": Steep.apply(model.weight.sum() + model.bias.sum(), 1.0 if progress < 0.97 else math.inf)}
+
+    with pytest.raises(TrainingDiverged, match="step 40"):
+        fit(model(), ruin, schedule(), tmp_path / "checkpoint", ignore)
+
+
+def test_a_continued_training_says_where_it_begins(tmp_path, caplog):
+    with pytest.raises(Interrupted):
+        fit(model(), NoisyQuadratic(17), schedule(), tmp_path / "checkpoint", ignore)
+    with caplog.at_level("INFO", "geomotion"):
+        fit(model(), NoisyQuadratic(), schedule(), tmp_path / "checkpoint", ignore)
+    assert "train: continues at step 17 of 40" in caplog.messages
+
+
 def test_a_damaged_checkpoint_is_reported(tmp_path):
     (tmp_path / "checkpoint").write_bytes(b"PK\x03\x04 half a file")
     with pytest.raises(CorruptArtefact, match="checkpoint cannot be read"):

@@ -10,7 +10,7 @@ from torchdiffeq import odeint
 
 from geomotion.dynamics.quadrature import Integrand
 from geomotion.dynamics.regularisers import Regulariser
-from geomotion.types import Float, Matrix, State, Tensor, Velocity
+from geomotion.types import Float, Matrix, State, States, Tensor, Velocity
 
 
 @runtime_checkable
@@ -67,11 +67,12 @@ class LineIntegralField(nn.Module):
     r"""Neural contractive dynamical system: a negative definite matrix, integrated from a base point.
 
     .. math::
-        \hat J(x) = -(J_\theta(x)^\top J_\theta(x) + \operatorname{diag} \varepsilon(x)), \qquad
+        \hat J(x) = -(J_\theta(x)^\top J_\theta(x) + \operatorname{diag} \varepsilon(x)) + S(x), \qquad
         f(x) = \dot x_0 + \int_0^1 \hat J(x_0 + t (x - x_0))\, (x - x_0)\, dt
 
     For all parameters: sym Ĵ ≼ -min ε I, f(x₀) = ẋ₀, and (x - x₀)·(f(x) - f(x₀)) ≤ -min ε ‖x - x₀‖², up to the
-    error of the integrator. For D = 1 and for constant Ĵ, the Jacobian of f is Ĵ and f contracts.
+    error of the integrator. For D = 1 and for constant Ĵ, the Jacobian of f is Ĵ and f contracts. The
+    skew-symmetric S changes none of this, since v·Sv = 0 for every v.
 
     Args:
         jacobian_root: J_θ, from states (\*batch, D) to matrices (\*batch, D, D).
@@ -79,6 +80,7 @@ class LineIntegralField(nn.Module):
         base_point: x₀, shape (D,); learned if it is an ``nn.Parameter``, fixed otherwise.
         base_velocity: ẋ₀, shape (D,); learned if it is an ``nn.Parameter``, fixed otherwise.
         integrator: How the integral is computed.
+        skew_part: S, from states (\*batch, D) to skew-symmetric matrices (\*batch, D, D); absent, Ĵ is symmetric.
 
     Note:
         For D ≥ 2 the claim that f contracts does not follow. The Jacobian of f is Ĵ only if every row of Ĵ is the
@@ -86,7 +88,7 @@ class LineIntegralField(nn.Module):
         eigenvalues, and on networks trained on handwriting it mostly has. Contraction of f is therefore measured on
         its true Jacobian, never read off Ĵ.
 
-    Source: Thesis Eq. (5.1), (5.2), (5.4).
+    Source: Thesis Eq. (5.1), (5.2), (5.4), (5.7).
     """
 
     base_point: Tensor
@@ -99,10 +101,12 @@ class LineIntegralField(nn.Module):
         base_point: Float[Tensor, " D"],
         base_velocity: Float[Tensor, " D"],
         integrator: LineIntegrator,
+        skew_part: Callable[[State], Matrix] | None = None,
     ) -> None:
         super().__init__()
         self.dim = base_point.shape[0]
         self.jacobian_root = jacobian_root
+        self.skew_part = skew_part
         self.regulariser = regulariser
         self.integrator = integrator
         for name, value in (("base_point", base_point), ("base_velocity", base_velocity)):
@@ -122,9 +126,17 @@ class LineIntegralField(nn.Module):
     def contraction_jacobian(self, x: State) -> Matrix:
         """Ĵ(x) [1/time]; the Jacobian of this field only for D = 1 or constant Ĵ."""
         root = self.jacobian_root(x)
-        return -(root.mT @ root + torch.diag_embed(self.regulariser(x)))
+        symmetric = -(root.mT @ root + torch.diag_embed(self.regulariser(x)))
+        return symmetric if self.skew_part is None else symmetric + self.skew_part(x)
+
+    def regularisation(self, x: States) -> Float[Tensor, ""]:
+        """What the regulariser adds to the training loss, judged at these states."""
+        return self.regulariser.loss(x, self.contraction_jacobian)
 
     def _jacobian_product(self, x: State, vector: Float[Tensor, "#*batch D"]) -> State:
-        """Ĵ(x) v without forming Ĵ."""
-        root = self.jacobian_root(x)
-        return -(root.mT @ (root @ vector.unsqueeze(-1))).squeeze(-1) - self.regulariser(x) * vector
+        """Ĵ(x) v without forming J_θᵀJ_θ."""
+        root, column = self.jacobian_root(x), vector.unsqueeze(-1)
+        product = -(root.mT @ (root @ column))
+        if self.skew_part is not None:
+            product = product + self.skew_part(x) @ column
+        return product.squeeze(-1) - self.regulariser(x) * vector

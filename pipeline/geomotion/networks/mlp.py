@@ -1,12 +1,13 @@
-"""Multi-layer perceptrons, and the one whose output is a square matrix."""
+"""Multi-layer perceptrons, and those whose output is a matrix."""
 
 from collections.abc import Sequence
 from itertools import pairwise
 
+import torch
 from torch import nn
 
 from geomotion.errors import UnknownName
-from geomotion.types import Matrix, State
+from geomotion.types import Float, Matrix, State, Tensor
 
 ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "softplus": nn.Softplus, "sigmoid": nn.Sigmoid}
 
@@ -32,6 +33,14 @@ class MLP(nn.Sequential):
             layers += [nn.Linear(width_in, width_out), ACTIVATIONS[activation]()]
         super().__init__(*layers, nn.Linear((inputs, *hidden_units)[-1], outputs))
 
+    def start_at(self, output: Float[Tensor, " outputs"]) -> None:
+        """Make the output the same everywhere, until training changes it."""
+        last = self[-1]
+        assert isinstance(last, nn.Linear)
+        nn.init.zeros_(last.weight)
+        with torch.no_grad():
+            last.bias.copy_(output)
+
 
 class JacobianRoot(nn.Module):
     """J_θ: a network from states to square matrices.
@@ -46,4 +55,28 @@ class JacobianRoot(nn.Module):
 
     def forward(self, x: State) -> Matrix:
         matrix: Matrix = self.network(x).unflatten(-1, (self.dim, self.dim))
+        return matrix
+
+
+class SkewMatrix(nn.Module):
+    r"""A network from states to skew-symmetric matrices, one output for each pair of axes.
+
+    .. math:: S(x) = \sum_{i > j} s_{ij}(x)\, (e_i e_j^\top - e_j e_i^\top)
+
+    Source: Thesis Eq. (5.8), for any number of axes D ≥ 2.
+    """
+
+    basis: Tensor
+
+    def __init__(self, dim: int, hidden_units: Sequence[int], activation: str = "tanh") -> None:
+        super().__init__()
+        self.dim = dim
+        rows, columns = torch.tril_indices(dim, dim, -1)
+        lower = torch.zeros(len(rows), dim, dim)
+        lower[torch.arange(len(rows)), rows, columns] = 1
+        self.register_buffer("basis", (lower - lower.mT).flatten(1), persistent=False)
+        self.network = MLP(dim, len(rows), hidden_units, activation)
+
+    def forward(self, x: State) -> Matrix:
+        matrix: Matrix = (self.network(x) @ self.basis).unflatten(-1, (self.dim, self.dim))
         return matrix

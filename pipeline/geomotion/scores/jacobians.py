@@ -1,6 +1,7 @@
 """True Jacobians of fields, by automatic differentiation, and the eigenvalues that decide about contraction."""
 
 from collections.abc import Callable
+from functools import partial
 
 import torch
 from torch.func import jvp
@@ -13,16 +14,22 @@ Jacobians = Float[Tensor, "point D D"]
 Eigenvalues = Float[Tensor, "point D"]
 
 
-def field_jacobian(function: Map, x: States) -> Jacobians:
+def field_jacobian(function: Map, x: States, differentiable: bool = False) -> Jacobians:
     """∂f/∂x at each point, by one backward pass per output over the whole batch.
 
     Backward passes ask nothing of `function` but to be differentiable, and to treat the rows of a batch
     independently; charts that linearise into a closure are fine.
+
+    Args:
+        function: f.
+        x: The points.
+        differentiable: Whether the result can be differentiated by the parameters of `function`.
     """
     with torch.enable_grad():
         x = x.detach().requires_grad_()
         outputs = function(x).sum(dim=0)
-        rows = [torch.autograd.grad(output, x, retain_graph=True, materialize_grads=True)[0] for output in outputs]
+        gradient = partial(torch.autograd.grad, retain_graph=True, create_graph=differentiable, materialize_grads=True)
+        rows = [gradient(output, x)[0] for output in outputs]
     return torch.stack(rows, dim=1)
 
 

@@ -2,31 +2,66 @@
 
 import torch
 
+from geomotion.config import VelocityTraining
 from geomotion.dynamics.fields import ChartedField
+from geomotion.dynamics.line_integral import LineIntegralField
+from geomotion.scores.grids import bounding_box
+from geomotion.scores.jacobians import field_jacobian
 from geomotion.training.data import Geometry, TrainingSet
 from geomotion.training.trainer import Losses
+from geomotion.types import Float, States, Tensor
 
 
 class VelocityReconstruction:
-    """Mean squared velocity error, Eq. (5.3), in units of the data's size and duration, and the regulariser's loss.
+    """Mean squared velocity error, Eq. (5.3), in units of the data's size and duration.
+
+    A line-integral field adds its regulariser's loss and, with `curl_weight` above 0, :func:`curl_penalty` on states
+    drawn from the box around the demonstrations, enlarged by `curl_margin`.
 
     Args:
         data: Demonstrated states and velocities.
         geometry: Their size and duration, which make the loss free of units.
-        batch_points: Points drawn in each step.
+        settings: Weights and sample sizes.
     """
 
-    def __init__(self, data: TrainingSet, geometry: Geometry, batch_points: int) -> None:
+    def __init__(self, data: TrainingSet, geometry: Geometry, settings: VelocityTraining) -> None:
+        self.settings = settings
         self.states = data.all_states
         self.velocities = data.all_velocities
-        self.batch_points = min(batch_points, len(self.states))
+        self.batch_points = min(settings.batch_points, len(self.states))
         self.speed_m_per_s = geometry.scale_m / geometry.duration_s
+        box = bounding_box([states.numpy() for states in data.states]).enlarged(settings.curl_margin)
+        self.lower, self.upper = torch.from_numpy(box.lower), torch.from_numpy(box.upper)
 
     def __call__(self, model: ChartedField, progress: float, generator: torch.Generator) -> Losses:
         chosen = torch.randint(len(self.states), (self.batch_points,), generator=generator)
-        error = (model(self.states[chosen]) - self.velocities[chosen]) / self.speed_m_per_s
+        states = self.states[chosen]
+        error = (model(states) - self.velocities[chosen]) / self.speed_m_per_s
         losses = {"velocity": error.square().sum(-1).mean()}
-        regulariser = getattr(model.field, "regulariser", None)
-        if regulariser is not None:
-            losses["regulariser"] = regulariser.loss()
+        if isinstance(model.field, LineIntegralField):
+            losses["regulariser"] = model.field.regularisation(_latent(model, states))
+            if self.settings.curl_weight > 0:
+                anywhere = _latent(model, self._random_states(generator))
+                losses["curl"] = self.settings.curl_weight * curl_penalty(model.field, anywhere)
         return losses
+
+    def _random_states(self, generator: torch.Generator) -> States:
+        share = torch.rand(self.settings.curl_points, len(self.lower), generator=generator)
+        return self.lower + share * (self.upper - self.lower)
+
+
+def curl_penalty(field: LineIntegralField, x: States) -> Float[Tensor, ""]:
+    r"""How far Ĵ is from being the Jacobian of the field, mean over states.
+
+    .. math:: \operatorname{mean}_x \left\| \partial f / \partial x - \hat J(x) \right\|_F^2
+
+    Zero where the rows of Ĵ are gradients, that is where their curl vanishes; only there Ĵ ≼ -ε I makes f contract.
+    """
+    gap = field_jacobian(field, x, differentiable=True) - field.contraction_jacobian(x)
+    return gap.square().sum((-2, -1)).mean()
+
+
+@torch.no_grad()
+def _latent(model: ChartedField, states: States) -> States:
+    """Where the field sees these states; penalties shape the field there and not the chart."""
+    return model.chart.to_latent(states)

@@ -1,0 +1,61 @@
+"""Training as a stage: what it writes, and what it refuses before it spends time."""
+
+import pytest
+import torch
+
+from geomotion import config as schema
+from geomotion import models
+from geomotion.demos import readers, storage
+from geomotion.demos.preprocessing import preprocess
+from geomotion.errors import InvalidSetting
+from geomotion.models import ModelConfig
+from geomotion.stages.train import TrainConfig, train
+from geomotion.tracking import Artefacts, StageRun
+
+LETTERS = schema.LettersDataset(name="letters/s", letter="s", demos=3, points=40)
+LINEAR = ModelConfig(schema.IdentityChart(), schema.LinearField(), schema.NoRegulariser(), 0)
+LINE_INTEGRAL = ModelConfig(
+    schema.IdentityChart(),
+    schema.LineIntegralField(hidden_units=[8], skew=True),
+    schema.EigenvalueRegulariser(),
+    0,
+)
+
+
+@pytest.fixture
+def ingested(tmp_path) -> dict[str, Artefacts]:
+    storage.save(preprocess(readers.read(LETTERS), LETTERS.preprocess), tmp_path / "ingest")
+    return {"ingest": Artefacts("ingest", "0", tmp_path / "ingest", "")}
+
+
+@pytest.fixture
+def run(tmp_path) -> StageRun:
+    (tmp_path / "train").mkdir()
+    run = StageRun(tmp_path / "train", tmp_path / "checkpoint", client=None, run_id="1")
+    run.log_series = lambda step, values: None
+    return run
+
+
+def test_every_loss_is_kept_and_the_model_can_be_read(ingested, run):
+    training = schema.VelocityTraining(steps=4, log_every_steps=1, curl_weight=0.1)
+    train(TrainConfig(LETTERS, LINE_INTEGRAL, training, 0), ingested, run)
+    header, *rows = (run.folder / "training.csv").read_text().splitlines()
+    assert header.split(",") == ["step", "total", "velocity", "regulariser", "curl", "learning_rate"]
+    assert len(rows) == 4
+    skill = models.load(run.folder / "model.pt")
+    assert skill.config == LINE_INTEGRAL
+    assert torch.isfinite(skill.field(skill.goal)).all()
+
+
+REFUSED = {
+    "training.curl_weight": (LINEAR, schema.VelocityTraining(curl_weight=0.1)),
+    "training": (LINE_INTEGRAL, schema.TrajectoryTraining()),
+}
+
+
+@pytest.mark.parametrize("key", REFUSED)
+def test_an_objective_that_does_not_suit_the_field_is_refused(ingested, run, key):
+    model, training = REFUSED[key]
+    with pytest.raises(InvalidSetting, match=rf"^{key}="):
+        train(TrainConfig(LETTERS, model, training, 0), ingested, run)
+    assert not list(run.folder.iterdir())
