@@ -1,4 +1,4 @@
-"""What a control loop pays for one velocity at one state: both fields with their default settings, eager and exported.
+"""What a control loop pays for one velocity at one state: all fields with their default settings, eager and exported.
 
 Run as ``python benchmarks/queries.py``. Parameters are random, which the time does not depend on. One core.
 """
@@ -22,6 +22,7 @@ CALLS = 1000
 
 MODELS = {
     "linear in a flow": ModelConfig(schema.FlowChart(), schema.LinearField(), schema.NoRegulariser(), 0),
+    "potential in a flow": ModelConfig(schema.FlowChart(), schema.PotentialField(), schema.NoRegulariser(), 0),
     "line integral": ModelConfig(schema.IdentityChart(), schema.LineIntegralField(), schema.ConstantRegulariser(), 0),
 }
 

@@ -53,7 +53,7 @@ def main() -> None:
             1e-2,
         ),
         ("linear in a flow, with the nearest-point term", linear, TrajectoryReproduction(data, geometry, late), 1e-2),
-        ("line integral", integral, VelocityReconstruction(data, geometry, velocity.batch_points), 1e-3),
+        ("line integral", integral, VelocityReconstruction(data, geometry, velocity), 1e-3),
     ):
         wall, processor = steps_per_second(model, geometry, objective, rate)
         print(f"{name:<48}{wall:>8.1f}{processor:>8.1f}", flush=True)

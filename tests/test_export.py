@@ -11,8 +11,15 @@ from geomotion.training.data import Geometry
 
 CONFIGURATIONS = {
     "linear in a flow": ModelConfig(schema.FlowChart(layers=4), schema.LinearField(), schema.NoRegulariser(), 1),
+    "potential in a flow": ModelConfig(schema.FlowChart(layers=4), schema.PotentialField(), schema.NoRegulariser(), 1),
     "line integral": ModelConfig(
         schema.IdentityChart(), schema.LineIntegralField(hidden_units=[20, 20]), schema.ConstantRegulariser(), 1
+    ),
+    "line integral, asymmetric, ε of the state": ModelConfig(
+        schema.IdentityChart(),
+        schema.LineIntegralField(hidden_units=[20, 20], skew=True),
+        schema.StateDependentRegulariser(hidden_units=[8]),
+        1,
     ),
 }
 

@@ -10,6 +10,7 @@ from geomotion.training.data import Geometry
 GEOMETRY = Geometry((0.1, -0.2), 0.05, (0.11, -0.19), (0.08, -0.21), 2.5)
 CONFIGURATIONS = {
     "linear in a flow": ModelConfig(schema.FlowChart(), schema.LinearField(), schema.NoRegulariser(), 1),
+    "potential in a flow": ModelConfig(schema.FlowChart(), schema.PotentialField(units=8), schema.NoRegulariser(), 1),
     "linear": ModelConfig(schema.IdentityChart(), schema.LinearField(), schema.NoRegulariser(), 1),
     "line integral": ModelConfig(
         schema.IdentityChart(), schema.LineIntegralField(hidden_units=[20, 20]), schema.ConstantRegulariser(), 1
@@ -21,6 +22,15 @@ CONFIGURATIONS = {
         ),
         schema.StateIndependentRegulariser(),
         1,
+    ),
+    "line integral, asymmetric, ε of the state": ModelConfig(
+        schema.IdentityChart(),
+        schema.LineIntegralField(hidden_units=[20, 20], skew=True),
+        schema.StateDependentRegulariser(hidden_units=[8], activation=schema.Activation.softplus),
+        1,
+    ),
+    "line integral, eigenvalues": ModelConfig(
+        schema.IdentityChart(), schema.LineIntegralField(hidden_units=[20]), schema.EigenvalueRegulariser(), 1
     ),
 }
 
@@ -80,6 +90,13 @@ def test_parts_that_do_not_go_together_are_refused():
         )
 
 
-def test_the_goal_is_an_equilibrium_of_a_linear_field():
-    skill = disturbed(CONFIGURATIONS["linear in a flow"])
+def test_a_skew_part_needs_two_coordinates():
+    config = ModelConfig(schema.IdentityChart(), schema.LineIntegralField(skew=True), schema.ConstantRegulariser(), 0)
+    with pytest.raises(InvalidSetting, match=r"field\.skew"):
+        models.build(config, Geometry((0.1,), 0.05, (0.1,), (0.1,), 2.5))
+
+
+@pytest.mark.parametrize("name", ["linear in a flow", "potential in a flow"])
+def test_the_goal_is_an_equilibrium_of_a_field_that_contracts_by_construction(name):
+    skill = disturbed(CONFIGURATIONS[name])
     torch.testing.assert_close(skill.field(skill.goal), torch.zeros(2), atol=1e-6, rtol=0)

@@ -6,6 +6,7 @@ send all of them back.
 
 import json
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 RunVerb = Callable[[str, GmsConfig, list[str]], "VerbResult"]
 """Carries out a verb with its typed configuration and the overrides that were typed."""
 
+RUN_KEYS = ("run", "runs")
+NUMBER_LIKE_ID = re.compile(r"(?<![\w./'\"])\d+e\d+(?![\w./'\"])")
+
 Job = Callable[[DictConfig], float | None]
 
 
@@ -51,7 +55,7 @@ def run(program: str, verb: str, arguments: list[str], reporter: Reporter, run_v
 
     try:
         _check_flags(arguments)
-        return run_hydra(program, reporter.command, arguments, job)
+        return run_hydra(program, reporter.command, [_with_ids_as_text(argument) for argument in arguments], job)
     except JobFailed as failed:
         return failed.exit_code
     except BrokenPipeError:
@@ -71,6 +75,14 @@ def run_hydra(program: str, command: str, arguments: list[str], job: Job) -> int
     except SystemExit as leaving:
         return int(leaving.code or 0)
     return 0
+
+
+def _with_ids_as_text(argument: str) -> str:
+    """Quote beginnings of run ids such as 12e45678, which Hydra would take for numbers."""
+    key, equals, value = argument.partition("=")
+    if key in RUN_KEYS:
+        value = NUMBER_LIKE_ID.sub(r"'\g<0>'", value)
+    return f"{key}{equals}{value}"
 
 
 def _check_flags(arguments: list[str]) -> None:

@@ -26,6 +26,7 @@ class Program:
 _DATASET = {"dataset=letters/j": "recordings to use; every choice is listed below"}
 _MODEL = {
     "field=linear": "contracting by construction, in the coordinates of a learned flow",
+    "field=potential": "the same with a nonlinear time law",
     "field=line_integral": "the thesis' field, contraction measured only",
 }
 _TRAINING = {
@@ -79,9 +80,14 @@ PROGRAMS = {
                     "rollout.demos=[0,1]": "from the first point of these demonstrations",
                     "rollout.starts_m=[[0.1,0.05]]": "or from these points [m]",
                     "rollout.duration_s=5.0": "how long [s]",
+                    "obstacle=sphere obstacle.centre_m=[0.1,0] obstacle.radius_m=0.01": "around an obstacle [m]",
                     **_JSON,
                 },
-                ("run=latest", "run=latest rollout.starts_m=[[-0.1,0.05]] rollout.duration_s=5.0"),
+                (
+                    "run=latest",
+                    "run=latest rollout.starts_m=[[-0.1,0.05]] rollout.duration_s=5.0",
+                    "run=latest obstacle=box obstacle.centre_m=[0.1,0] obstacle.sides_m=[0.02,0.01]",
+                ),
             ),
             "eval": Verb(
                 "score a trained field and write its certificate",

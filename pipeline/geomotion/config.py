@@ -11,7 +11,8 @@ from enum import Enum
 from typing import Any
 
 from hydra.core.config_store import ConfigStore
-from omegaconf import MISSING
+from omegaconf import MISSING, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
 from geomotion.errors import InvalidSetting, UnknownName
 
@@ -47,6 +48,20 @@ def _require_positive(prefix: str, owner: object, *names: str) -> None:
     for name in names:
         value = getattr(owner, name)
         _require(value > 0, f"{prefix}.{name}", value, "a number above 0")
+
+
+def _require_rates(field: Any) -> None:
+    _require_positive("field", field, "min_rate_per_duration")
+    _require(
+        field.initial_rate_per_duration > field.min_rate_per_duration,
+        "field.initial_rate_per_duration",
+        field.initial_rate_per_duration,
+        "more than field.min_rate_per_duration",
+    )
+
+
+def _require_layer_widths(prefix: str, widths: list[int]) -> None:
+    _require(len(widths) > 0 and min(widths) > 0, f"{prefix}.hidden_units", widths, "positive layer widths")
 
 
 # ---------------------------------------------------------------- demonstrations
@@ -211,13 +226,20 @@ class LinearField(FieldConfig):
     initial_rate_per_duration: float = 2.0
 
     def __post_init__(self) -> None:
-        _require_positive("field", self, "min_rate_per_duration")
-        _require(
-            self.initial_rate_per_duration > self.min_rate_per_duration,
-            "field.initial_rate_per_duration",
-            self.initial_rate_per_duration,
-            "more than field.min_rate_per_duration",
-        )
+        _require_rates(self)
+
+
+@dataclass
+class PotentialField(FieldConfig):
+    """ż = -∇φ(z) + S z, φ strongly convex: a linear field and saturating pulls; contracting by construction."""
+
+    units: int = 32  # saturating pulls
+    min_rate_per_duration: float = 0.1  # certified rate, in units of 1 / mean demonstration duration
+    initial_rate_per_duration: float = 1.0  # of the linear part; the pulls add to it
+
+    def __post_init__(self) -> None:
+        _require_positive("field", self, "units")
+        _require_rates(self)
 
 
 class BasePoint(Enum):
@@ -259,6 +281,7 @@ class LineIntegralField(FieldConfig):
     activation: Activation = Activation.tanh
     base_point: BasePoint = BasePoint.data_mean
     base_velocity: BaseVelocity = BaseVelocity.learned
+    skew: bool = False  # add a learned skew-symmetric part to Ĵ, Eq. (5.7), (5.8)
     integrator: Integrator = Integrator.quadrature
     nodes: int = 10  # quadrature nodes, or steps of rk4
     relative_tolerance: float = 1e-5  # dopri5
@@ -266,12 +289,7 @@ class LineIntegralField(FieldConfig):
 
     def __post_init__(self) -> None:
         _require_positive("field", self, "nodes", "relative_tolerance", "absolute_tolerance")
-        _require(
-            len(self.hidden_units) > 0 and min(self.hidden_units) > 0,
-            "field.hidden_units",
-            self.hidden_units,
-            "positive layer widths",
-        )
+        _require_layer_widths("field", self.hidden_units)
 
 
 @dataclass
@@ -295,16 +313,51 @@ class ConstantRegulariser(RegulariserConfig):
 
 
 @dataclass
-class StateIndependentRegulariser(RegulariserConfig):
-    """Eq. (5.4), (5.5): a learned vector ε, its entries pushed apart; the push stops at `spread_limit`."""
+class SpreadRegulariser(RegulariserConfig):
+    """Those that push something apart: (5.5) and (5.6) are unbounded below, so the push stops at `spread_limit`."""
 
-    initial_epsilon: float = 0.01
     spread_weight: float = 1e-3  # β
-    spread_limit: float = 10.0  # (5.5) is unbounded below; beyond this difference it stops paying
+    spread_limit: float = 10.0  # difference beyond which the loss stops paying
 
     def __post_init__(self) -> None:
-        _require_positive("regulariser", self, "initial_epsilon", "spread_limit")
         _require(self.spread_weight >= 0, "regulariser.spread_weight", self.spread_weight, "0 or more")
+        _require_positive("regulariser", self, "spread_limit")
+
+
+@dataclass
+class StateIndependentRegulariser(SpreadRegulariser):
+    """Eq. (5.4), (5.5): a learned vector ε, its entries pushed apart."""
+
+    initial_epsilon: float = 0.01
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("regulariser", self, "initial_epsilon")
+
+
+@dataclass
+class StateDependentRegulariser(SpreadRegulariser):
+    """Eq. (5.4), (5.5): ε as a network of the state, its entries pushed apart."""
+
+    initial_epsilon: float = 0.01
+    hidden_units: list[int] = default(default_factory=lambda: [32, 32])
+    activation: Activation = Activation.tanh
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("regulariser", self, "initial_epsilon")
+        _require_layer_widths("regulariser", self.hidden_units)
+
+
+@dataclass
+class EigenvalueRegulariser(SpreadRegulariser):
+    """Eq. (5.6): a fixed ε, and a loss that pushes the eigenvalues of Ĵ away from the largest."""
+
+    epsilon: float = 0.01
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("regulariser", self, "epsilon")
 
 
 # ---------------------------------------------------------------- training, rollouts, evaluation
@@ -361,10 +414,120 @@ class VelocityTraining(TrainingConfig):
     steps: int = 3000
     learning_rate: float = 3e-3
     batch_points: int = 128
+    curl_weight: float = 0.0  # on ‖∂f/∂x - Ĵ‖² of a line-integral field; pulls it towards contraction
+    curl_points: int = 64  # random states of each step
+    curl_margin: float = 0.2  # share of its extent by which the box around the demonstrations grows on each side
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_positive("training", self, "batch_points")
+        _require_positive("training", self, "batch_points", "curl_points")
+        for name in ("curl_weight", "curl_margin"):
+            _require(getattr(self, name) >= 0, f"training.{name}", getattr(self, name), "0 or more")
+
+
+@dataclass
+class ObstacleConfig:
+    """What stands in the way of rollouts."""
+
+
+@dataclass
+class NoObstacle(ObstacleConfig):
+    """Free space."""
+
+
+@dataclass
+class Avoidance(ObstacleConfig):
+    """How obstacles change a field, Eq. (5.9)-(5.12), (6.9)."""
+
+    reactivity: float = 1.0  # ρ: the larger, the farther an obstacle is felt
+    escape: bool = True  # a tangential field where obstacles bring the motion to rest
+    recovery_time_s: float = 0.1  # how long a state inside an obstacle takes to leave it
+
+    def __post_init__(self) -> None:
+        _require_positive("obstacle", self, "reactivity", "recovery_time_s")
+
+
+@dataclass
+class SolidObstacle(Avoidance):
+    """A body and its constant velocity; the coordinates are those of the state."""
+
+    centre_m: list[float] = MISSING
+    velocity_m_per_s: list[float] | None = None  # null: at rest
+    rotation_rad: list[float] | None = None  # null: none; one angle in a plane, a rotation vector in space
+
+
+@dataclass
+class SphereObstacle(SolidObstacle):
+    """A ball."""
+
+    radius_m: float = MISSING
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("obstacle", self, "radius_m")
+        _require(self.rotation_rad is None, "obstacle.rotation_rad", self.rotation_rad, "null: a sphere has none")
+
+
+@dataclass
+class EllipsoidObstacle(SolidObstacle):
+    """A stretched ball."""
+
+    semi_axes_m: list[float] = MISSING
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require(min(self.semi_axes_m, default=0) > 0, "obstacle.semi_axes_m", self.semi_axes_m, "lengths above 0")
+
+
+@dataclass
+class BoxObstacle(SolidObstacle):
+    """A box with rounded edges and corners."""
+
+    sides_m: list[float] = MISSING
+    rounding_m: float | None = None  # null: a quarter of the shortest side
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        shortest = min(self.sides_m, default=0.0)
+        _require(shortest > 0, "obstacle.sides_m", self.sides_m, "lengths above 0")
+        if self.rounding_m is not None:
+            fits = 0 < self.rounding_m <= shortest / 2
+            _require(fits, "obstacle.rounding_m", self.rounding_m, "above 0 and at most half of the shortest side")
+
+
+@dataclass
+class SeveralObstacles(Avoidance):
+    """Several bodies: shape (sphere, ellipsoid or box) with the keys of that shape."""
+
+    bodies: list[Any] = MISSING
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require(len(self.bodies) > 0, "obstacle.bodies", self.bodies, "one obstacle or more")
+        self.bodies = [_body(body) for body in self.bodies]
+
+
+def _body(body: Any) -> SolidObstacle:
+    if isinstance(body, SolidObstacle):
+        return body
+    _require(isinstance(body, dict) and "shape" in body, "obstacle.bodies", body, "{shape:sphere,centre_m:[0,0],…}")
+    kinds: dict[str, type[SolidObstacle]] = {
+        "sphere": SphereObstacle,
+        "ellipsoid": EllipsoidObstacle,
+        "box": BoxObstacle,
+    }
+    _require_known("shape of an obstacle", str(body["shape"]), tuple(kinds))
+    settings = {name: value for name, value in body.items() if name != "shape"}
+    shared = sorted(settings.keys() & {item.name for item in fields(Avoidance)})
+    _require(not shared, "obstacle.bodies", body, f"{', '.join(shared)} beside the list, once for all")
+    try:
+        solid: SolidObstacle = OmegaConf.to_object(
+            OmegaConf.merge(OmegaConf.structured(kinds[body["shape"]]), settings)
+        )  # type: ignore[assignment]
+    except OmegaConfBaseException as error:
+        problem = str(error).splitlines()[0]
+        raise InvalidSetting("obstacle.bodies", body, f"the keys of obstacle={body['shape']} ({problem})") from error
+    return solid
 
 
 class SolverMethod(Enum):
@@ -495,6 +658,7 @@ class NcdsConfig(GmsConfig):
     field: FieldConfig = MISSING
     regulariser: RegulariserConfig = MISSING
     training: TrainingConfig = MISSING
+    obstacle: ObstacleConfig = MISSING
     solver: SolverConfig = default(default_factory=SolverConfig)
     rollout: RolloutConfig = default(default_factory=RolloutConfig)
     evaluation: EvaluationConfig = default(default_factory=EvaluationConfig)
@@ -538,13 +702,26 @@ def register() -> None:
     store(name="ncds_schema", node=NcdsConfig)
     choices: dict[str, dict[str, Any]] = {
         "chart": {"identity": IdentityChart, "flow": FlowChart},
-        "field": {"linear_schema": LinearField, "line_integral_schema": LineIntegralField},
+        "field": {
+            "linear_schema": LinearField,
+            "potential_schema": PotentialField,
+            "line_integral_schema": LineIntegralField,
+        },
         "regulariser": {
             "none": NoRegulariser,
             "constant": ConstantRegulariser,
             "state_independent": StateIndependentRegulariser,
+            "state_dependent": StateDependentRegulariser,
+            "eigenvalue": EigenvalueRegulariser,
         },
         "training": {"trajectory": TrajectoryTraining, "velocity": VelocityTraining},
+        "obstacle": {
+            "none": NoObstacle,
+            "sphere": SphereObstacle,
+            "ellipsoid": EllipsoidObstacle,
+            "box": BoxObstacle,
+            "several": SeveralObstacles,
+        },
         "evaluation": {"heldout": EvaluationConfig, "peers": EvaluationConfig(protocol=Protocol.peers)},
         "dataset": {
             "folder": FolderDataset(name="folder"),

@@ -10,15 +10,23 @@ from torch import nn
 
 from geomotion import config as schema
 from geomotion.dynamics.charts import AnchoredChart, ComposedChart, IdentityChart, ScalingChart
-from geomotion.dynamics.fields import Chart, ChartedField, VectorField
+from geomotion.dynamics.fields import Chart, ChartedField
 from geomotion.dynamics.line_integral import DormandPrince, LineIntegralField, LineIntegrator, RungeKutta4
 from geomotion.dynamics.linear import LinearField
+from geomotion.dynamics.potential import PotentialField
 from geomotion.dynamics.quadrature import GaussLegendre
-from geomotion.dynamics.regularisers import ConstantRegulariser, Regulariser, StateIndependentRegulariser
+from geomotion.dynamics.regularisers import (
+    ConstantRegulariser,
+    EigenvalueRegulariser,
+    Regulariser,
+    StateDependentRegulariser,
+    StateIndependentRegulariser,
+    unequal_roots,
+)
 from geomotion.errors import CorruptArtefact, InvalidSetting
 from geomotion.files import write_tensors
 from geomotion.networks.coupling import CouplingFlow
-from geomotion.networks.mlp import JacobianRoot
+from geomotion.networks.mlp import MLP, JacobianRoot, SkewMatrix
 from geomotion.training.data import Geometry
 
 FORMAT = 1  # of the model file; raised when older files can no longer be read
@@ -77,13 +85,10 @@ def build(config: ModelConfig, geometry: Geometry) -> ChartedField:
         scaling = ScalingChart(torch.tensor(geometry.centre), geometry.scale_m)
         chart = ComposedChart(scaling, _chart(config.chart, scaling.dim))
         match config.field:
-            case schema.LinearField() as linear:
+            case schema.LinearField() | schema.PotentialField() as exact:
                 _refuse_regulariser(config.regulariser)
-                field: VectorField = LinearField(
-                    scaling.dim, linear.min_rate_per_duration, linear.initial_rate_per_duration
-                )
                 anchored: Chart = AnchoredChart(chart, torch.tensor(geometry.goal))
-                return ChartedField(anchored, field, geometry.duration_s)
+                return ChartedField(anchored, _exact_field(exact, scaling.dim), geometry.duration_s)
             case schema.LineIntegralField() as integral:
                 field = _line_integral(integral, config.regulariser, chart, geometry)
                 return ChartedField(chart, field, geometry.duration_s)
@@ -103,6 +108,13 @@ def _chart(config: schema.ChartConfig, dim: int) -> Chart:
             raise TypeError(f"no builder for {type(unknown).__name__}")
 
 
+def _exact_field(config: schema.LinearField | schema.PotentialField, dim: int) -> LinearField | PotentialField:
+    rates = config.min_rate_per_duration, config.initial_rate_per_duration
+    if isinstance(config, schema.PotentialField):
+        return PotentialField(dim, config.units, *rates)
+    return LinearField(dim, *rates)
+
+
 def _line_integral(
     config: schema.LineIntegralField, regulariser: schema.RegulariserConfig, chart: Chart, geometry: Geometry
 ) -> LineIntegralField:
@@ -110,12 +122,16 @@ def _line_integral(
     with torch.no_grad():
         base_point = chart.to_latent(base)
     base_velocity = torch.zeros_like(base_point)
+    if config.skew and chart.dim < 2:
+        raise InvalidSetting("field.skew", True, "false in one dimension, where only 0 is skew-symmetric")
+    layers = (chart.dim, config.hidden_units, config.activation.value)
     return LineIntegralField(
-        JacobianRoot(chart.dim, config.hidden_units, config.activation.value),
+        JacobianRoot(*layers),
         _regulariser(regulariser, chart.dim),
         nn.Parameter(base_point) if config.base_point is schema.BasePoint.learned else base_point,
         nn.Parameter(base_velocity) if config.base_velocity is schema.BaseVelocity.learned else base_velocity,
         _integrator(config),
+        SkewMatrix(*layers) if config.skew else None,
     )
 
 
@@ -135,8 +151,14 @@ def _regulariser(config: schema.RegulariserConfig, dim: int) -> Regulariser:
             return ConstantRegulariser(config.epsilon, dim)
         case schema.StateIndependentRegulariser():
             return StateIndependentRegulariser(config.initial_epsilon, dim, config.spread_weight, config.spread_limit)
+        case schema.StateDependentRegulariser():
+            root = MLP(dim, dim, config.hidden_units, config.activation.value)
+            root.start_at(unequal_roots(config.initial_epsilon, dim))
+            return StateDependentRegulariser(root, config.spread_weight, config.spread_limit)
+        case schema.EigenvalueRegulariser():
+            return EigenvalueRegulariser(config.epsilon, dim, config.spread_weight, config.spread_limit)
         case _:
-            raise InvalidSetting("regulariser", "none", "constant or state_independent for field=line_integral")
+            raise InvalidSetting("regulariser", "none", "a regulariser for field=line_integral, such as constant")
 
 
 def _refuse_regulariser(config: schema.RegulariserConfig) -> None:
@@ -144,7 +166,7 @@ def _refuse_regulariser(config: schema.RegulariserConfig) -> None:
         raise InvalidSetting(
             "regulariser",
             type(config).__name__,
-            "none: a linear field contracts by construction; its rate is field.min_rate_per_duration",
+            "none: this field contracts by construction; its rate is at least field.min_rate_per_duration",
         )
 
 
@@ -203,8 +225,10 @@ def _model_config(document: Mapping[str, Any]) -> ModelConfig:
 def _component(document: Mapping[str, Any]) -> Any:
     """A configuration object from its plain form; the set of kinds is closed."""
     kinds: Sequence[type] = (
-        schema.IdentityChart, schema.FlowChart, schema.LinearField, schema.LineIntegralField,
+        schema.IdentityChart, schema.FlowChart,
+        schema.LinearField, schema.PotentialField, schema.LineIntegralField,
         schema.NoRegulariser, schema.ConstantRegulariser, schema.StateIndependentRegulariser,
+        schema.StateDependentRegulariser, schema.EigenvalueRegulariser,
     )  # fmt: skip
     kind = {kind.__name__: kind for kind in kinds}[document["kind"]]
     values = {name: value for name, value in document.items() if name != "kind"}

@@ -13,7 +13,7 @@ class Policy(PythonModel):
         """Open the ONNX file."""
         self.session = onnxruntime.InferenceSession(context.artifacts["policy"], providers=["CPUExecutionProvider"])
 
-    def predict(self, context, model_input, params=None):  # type: ignore[no-untyped-def]
+    def predict(self, context, model_input: np.ndarray, params=None):  # type: ignore[no-untyped-def]
         """Velocities at states."""
         return self.session.run(None, {"state_m": np.asarray(model_input, dtype=np.float32)})[0]
 

@@ -53,17 +53,25 @@ def pipeline() -> Callable[..., SimpleNamespace]:
 
 
 @pytest.fixture
-def command(monkeypatch, tmp_path, capfd, pipeline) -> Callable[..., Answer]:
-    """``command("train", "seed=1")`` answers like ``ncds train seed=1``, in an empty folder."""
-    monkeypatch.chdir(tmp_path)
+def undisturbed(monkeypatch) -> None:
+    """What a command changes in its process is put back: its arguments, its environment, the loggers."""
     monkeypatch.setattr(sys, "argv", sys.argv)
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
-    root = logging.getLogger()
+    root, own = logging.getLogger(), logging.getLogger("geomotion")
     handlers, level = root.handlers[:], root.level
+    for name in ("handlers", "level", "propagate"):
+        monkeypatch.setattr(own, name, getattr(own, name))
+    yield
+    root.handlers[:], root.level = handlers, level
+
+
+@pytest.fixture
+def command(monkeypatch, tmp_path, capfd, pipeline, undisturbed) -> Callable[..., Answer]:
+    """``command("train", "seed=1")`` answers like ``ncds train seed=1``, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
 
     def call(*arguments: str, program: str = "ncds") -> Answer:
         status = main(program, list(arguments), pipeline)
         return Answer(status, *capfd.readouterr())
 
-    yield call
-    root.handlers[:], root.level = handlers, level
+    return call

@@ -1,6 +1,7 @@
 """Overrides: every offered choice composes, and every mistake gets one line that says what was meant."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from hydra import compose, initialize_config_module
@@ -8,10 +9,19 @@ from omegaconf import OmegaConf
 
 from geomotion.config import GmsConfig, NcdsConfig
 from geomotion_cli.choices import group_options, top_level_names
+from geomotion_cli.dispatch import main
 
 OPTIONS = [
     f"{group}={option}" for group, options in group_options(*top_level_names(NcdsConfig)).items() for option in options
 ]
+
+NEEDED = {  # what has no default
+    "dataset=folder": ["dataset.root=recordings"],
+    "obstacle=sphere": ["obstacle.centre_m=[0,0]", "obstacle.radius_m=1"],
+    "obstacle=ellipsoid": ["obstacle.centre_m=[0,0]", "obstacle.semi_axes_m=[1,2]"],
+    "obstacle=box": ["obstacle.centre_m=[0,0]", "obstacle.sides_m=[1,2]"],
+    "obstacle=several": ["obstacle.bodies=[{shape:sphere,centre_m:[0,0],radius_m:1}]"],
+}
 
 
 @pytest.fixture
@@ -22,8 +32,7 @@ def configuration():
 
 @pytest.mark.parametrize("choice", OPTIONS)
 def test_every_choice_makes_a_typed_configuration(configuration, choice):
-    extra = ["dataset.root=recordings"] if choice == "dataset=folder" else []
-    config = OmegaConf.to_object(compose("ncds", overrides=[choice, *extra]))
+    config = OmegaConf.to_object(compose("ncds", overrides=[choice, *NEEDED.get(choice, ())]))
     assert type(config) is NcdsConfig
 
 
@@ -72,6 +81,19 @@ def test_a_mistake_gets_one_helpful_line_and_status_two(command, mistake):
     assert MISTAKES[mistake] in answer.err
     assert answer.err.count("\n") == 1
     assert "HYDRA_FULL_ERROR" not in answer.err
+
+
+@pytest.mark.parametrize("run", ["12e45678", "0123456e", "1234567890"])
+def test_the_beginning_of_a_run_id_is_not_taken_for_a_number(monkeypatch, tmp_path, undisturbed, run):
+    named = []
+
+    def run_verb(verb, config, overrides):
+        named.extend([config.run, *config.runs])
+        return SimpleNamespace(text="", document={}, exit_code=0, objective=None)
+
+    monkeypatch.chdir(tmp_path)
+    assert main("ncds", ["eval", f"run={run}", f"runs=[{run},latest]"], run_verb) == 0
+    assert named == [run, run, "latest"]
 
 
 @pytest.mark.parametrize("mistake", ["chart.layrs=3,4", "dataset=lasa/angel,lasa/sine"])

@@ -7,7 +7,7 @@ import pytest
 from geomotion.config import TrackingConfig
 from geomotion.errors import CorruptArtefact, DiskFull, Interrupted, MissingArtefact, MissingRun, StoreUnavailable
 from geomotion.files import atomic
-from geomotion.tracking import Stage, Tracker
+from geomotion.tracking import Stage, Tracker, store
 from geomotion.tracking.artefacts import digest_of, run_key
 
 
@@ -118,6 +118,39 @@ def test_a_stopped_stage_is_marked_killed_and_continued_in_the_same_run(config):
     assert not list((Path(config.root) / "work").glob("*.checkpoint"))
 
 
+def test_what_was_logged_before_a_failure_is_kept(config):
+    def diverge(settings, inputs, run):
+        run.log_series(1, {"loss": 0.5})
+        raise ValueError("infinite")
+
+    with pytest.raises(ValueError, match="infinite"):
+        execute(config, Stage("train", diverge), {})
+    tracker = Tracker(config)
+    (run,) = tracker.client.search_runs([tracker.experiment_id], "tags.`geomotion.stage` = 'train'")
+    assert run.data.metrics == {"loss": 0.5}
+
+
+def test_a_stage_begins_in_an_empty_folder_even_after_a_killed_process(config):
+    def remember(settings, inputs, run):
+        found.append(sorted(path.name for path in run.folder.iterdir()))
+
+    found = []
+    left_behind = Path(config.root) / "work" / f"{run_key('train', {}, {})}.outputs"
+    left_behind.mkdir(parents=True)
+    (left_behind / "half.txt").write_text("half")
+    execute(config, Stage("train", remember), {})
+    assert found == [["config.json", "environment.json"]]
+    assert not left_behind.exists()
+
+
+def test_a_database_error_inside_a_stage_is_one_of_the_store(config):
+    def log(settings, inputs, run):
+        run.log_series(0, {"not a name?*": 1.0})
+
+    with pytest.raises(StoreUnavailable, match="Invalid"), store.database_errors("sqlite:///here"):
+        execute(config, Stage("train", log), {})
+
+
 def test_a_full_disk_fails_the_stage_with_one_clear_error(config, monkeypatch):
     def write(settings, inputs, run):
         with atomic(run.folder / "model.pt") as temporary:
@@ -141,6 +174,16 @@ class TestLineage:
             str(trained.folder / "value.txt"),
         ):
             assert tracker.lineage(name) == {"ingest": ingested, "train": trained}
+
+    def test_a_repetition_that_found_nothing_new_leads_to_what_was_kept(self, config):
+        stage = Stage("ingest", Counting(), reads_outside=True)
+        first = execute(config, stage, {})
+        execute(config, stage, {})
+        tracker = Tracker(config)
+        runs = tracker.client.search_runs([tracker.experiment_id], "tags.`geomotion.stage` = 'ingest'")
+        assert len(runs) == 2
+        for run in runs:
+            assert tracker.lineage(run.info.run_id) == {"ingest": first}
 
     def test_missing_runs_are_reported(self, config):
         tracker = Tracker(config)

@@ -26,7 +26,19 @@ from geomotion.stages.train import TrainConfig, train
 from geomotion.tracking import Artefacts, Stage, Tracker, store
 from geomotion.tracking.tracker import CommandRun
 
-EXECUTION_KEYS = ("evaluation", "solver", "rollout", "tracking", "output", "reuse", "run", "runs", "check", "hydra")
+EXECUTION_KEYS = (
+    "evaluation",
+    "solver",
+    "obstacle",
+    "rollout",
+    "tracking",
+    "output",
+    "reuse",
+    "run",
+    "runs",
+    "check",
+    "hydra",
+)
 
 
 @dataclass(frozen=True)
@@ -95,10 +107,11 @@ def _session(name: str, config: GmsConfig, overrides: list[str]) -> Iterator[Ses
     run = getattr(config, "run", None)
     if run is not None:
         _refuse_training_overrides(run, overrides)
-        if not store.exists(config.tracking):
-            raise MissingRun(
-                run, f"there is no store in {config.tracking.root}/ yet. Train first: ncds train dataset=…"
-            )
+    wanted = [run] if run is not None else getattr(config, "runs", [])
+    if wanted and not store.exists(config.tracking):
+        raise MissingRun(
+            wanted[0], f"there is no store in {config.tracking.root}/ yet. Train first: ncds train dataset=…"
+        )
     tracker = Tracker(config.tracking, config.reuse)
     done = _trained(tracker, run) if run is not None else {}
     typed = overrides if run is None else tracker.overrides(run)
@@ -158,7 +171,7 @@ def _train_config(session: Session) -> TrainConfig:
 
 
 def _rollout_config(session: Session) -> RolloutStageConfig:
-    return RolloutStageConfig(session.config.rollout, session.config.solver)
+    return RolloutStageConfig(session.config.rollout, session.config.solver, session.config.obstacle)
 
 
 def _evaluate_config(session: Session) -> EvaluateConfig:

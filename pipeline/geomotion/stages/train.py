@@ -71,7 +71,9 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
 def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Objective[ChartedField]:
     match config.training:
         case schema.VelocityTraining() as velocity:
-            return VelocityReconstruction(data, geometry, velocity.batch_points)
+            if velocity.curl_weight > 0 and not isinstance(config.model.field, schema.LineIntegralField):
+                raise InvalidSetting("training.curl_weight", velocity.curl_weight, "0: only field=line_integral has Ĵ")
+            return VelocityReconstruction(data, geometry, velocity)
         case schema.TrajectoryTraining() as trajectory:
             if not isinstance(config.model.field, schema.LinearField):
                 raise InvalidSetting("training", "trajectory", "velocity: this field has no closed-form trajectories")

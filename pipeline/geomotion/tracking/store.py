@@ -71,6 +71,7 @@ def _reason(error: Exception) -> str:
         ("database is locked", "the database is locked by another program"),
         ("not a database", "the file is not an SQLite database"),
         ("malformed", "the database is damaged"),
+        ("disk I/O error", "the disk is full or fails"),
         ("readonly", "the database is read-only"),
         ("unable to open", "the database cannot be opened"),
         ("out-of-date database schema", "it was made by another MLflow version; run `mlflow db upgrade` on it"),
@@ -123,5 +124,7 @@ def _quiet() -> None:
     os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")  # its own 7 take minutes where no server answers
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     os.environ.setdefault("MLFLOW_SQLALCHEMYSTORE_POOLCLASS", "NullPool")
-    for name in ("mlflow", "alembic", "mlflow.store.db.utils"):
+    for name in ("mlflow", "alembic"):
         logging.getLogger(name).setLevel(logging.WARNING)
+    for name in ("mlflow.store.db.utils", "urllib3"):  # they log with a traceback what they raise, too
+        logging.getLogger(name).setLevel(logging.CRITICAL)

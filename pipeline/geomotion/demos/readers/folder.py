@@ -4,6 +4,7 @@ The schema of columns and arrays is described in docs/data.md.
 """
 
 import json
+import os
 from pathlib import Path
 
 from geomotion.config import FolderDataset
@@ -26,6 +27,8 @@ def read(config: FolderDataset) -> Demonstrations:
     if not root.is_dir():
         what = "is a file" if root.exists() else "does not exist"
         raise MissingData(f"folder {root}", f"It {what}; set dataset.root= to the folder of your recordings.")
+    if not os.access(root, os.R_OK | os.X_OK):
+        raise DatasetError(root, "this folder cannot be read: permission denied")
     if (root / storage.INFO).is_file():
         return _read_dataset(root, config)
     trajectories = [trajectory for path in _recordings(root) for trajectory in _read_file(path, config)]

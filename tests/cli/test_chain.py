@@ -1,0 +1,254 @@
+"""The whole chain as a user meets it: commands, stores on disk, standard output and error, exit statuses."""
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+TOY = (
+    "dataset.points=60", "chart.layers=2", "chart.features=8", "training.steps=30",
+    "evaluation.region_steps=50", "evaluation.region_starts=9", "evaluation.contraction_grid_points=5",
+)  # fmt: skip
+STAGES = ("ingest", "train", "rollout", "evaluate", "export", "report")
+
+
+@dataclass
+class Answer:
+    """What a command left behind."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def document(self):
+        return json.loads(self.out)
+
+    def artefact(self, stage: str, name: str) -> Path:
+        return Path(self.document["stages"][stage]["folder"]) / name
+
+    def read(self, stage: str, name: str):
+        return json.loads(self.artefact(stage, name).read_text())
+
+
+def start(folder: Path, *arguments: str, program: str = "ncds") -> subprocess.Popen:
+    command = [sys.executable, "-m", "geomotion_cli", program, *arguments]
+    return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def finish(process: subprocess.Popen) -> Answer:
+    out, err = process.communicate(timeout=300)
+    return Answer(process.returncode, out, err)
+
+
+def call(folder: Path, *arguments: str, program: str = "ncds") -> Answer:
+    return finish(start(folder, *arguments, program=program))
+
+
+def done(answer: Answer) -> Answer:
+    assert answer.status == 0, answer.err
+    return answer
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """Where all commands of this file are typed; its store is made by the first."""
+    return tmp_path_factory.mktemp("chain of ncds")  # spaces have to do no harm
+
+
+@pytest.fixture(scope="module")
+def linear(folder) -> Answer:
+    return done(call(folder, "run", "dataset=letters/j", *TOY, "output=json"))
+
+
+@pytest.fixture(scope="module")
+def line_integral(folder) -> Answer:
+    settings = [setting for setting in TOY if not setting.startswith("chart.")]
+    thesis = ("field=line_integral", "field.hidden_units=[6,6]")
+    return done(call(folder, "run", "dataset=letters/j", *settings, *thesis, "output=json"))
+
+
+@pytest.fixture
+def here(folder, monkeypatch, capfd, undisturbed):
+    """A command in this process, where libraries are imported already."""
+    from geomotion_cli.dispatch import main
+
+    monkeypatch.chdir(folder)
+
+    def call(*arguments: str, program: str = "ncds") -> Answer:
+        return Answer(main(program, list(arguments)), *capfd.readouterr())
+
+    return call
+
+
+class TestRun:
+    def test_every_stage_leaves_what_its_contract_says(self, linear):
+        assert list(linear.document["stages"]) == list(STAGES)
+        for stage, names in {
+            "ingest": ["meta/info.json", "data/chunk-000/file-000.parquet", "summary.json"],
+            "train": ["model.pt", "training.csv", "certificate.json"],
+            "rollout": ["rollouts/meta/info.json", "rollouts.json"],
+            "evaluate": ["scores.json", "certificate.json", "evaluation.npz"],
+            "export": ["policy.onnx", "policy.json"],
+            "report": ["report.html"],
+        }.items():
+            for name in [*names, "config.json", "environment.json"]:
+                assert linear.artefact(stage, name).stat().st_size > 0
+
+    def test_the_certificate_holds_by_construction_at_a_positive_rate(self, linear):
+        certificate = linear.read("evaluate", "certificate.json")
+        assert certificate["claim"] == "by_construction"
+        assert certificate["rate_per_s"] > 0
+        assert certificate["audit"]["contraction.claimed.non_contracting_fraction"] == 0
+        assert linear.document["certificate"] == certificate
+
+    def test_scores_are_finite_and_printed_as_they_are_stored(self, linear):
+        scores = linear.read("evaluate", "scores.json")
+        assert linear.document["scores"] == scores
+        assert {"train.dtwd_per_point", "heldout.ratio_to_nearest_demo", "region.steps_inside"} <= set(scores["scores"])
+        assert all(np.isfinite(score["value"]) for score in scores["scores"].values())
+
+    def test_rollouts_begin_where_the_demonstrations_do(self, linear):
+        from geomotion.demos import storage
+
+        demonstrations = storage.load(linear.artefact("ingest", ""))
+        rollouts = storage.load(linear.artefact("rollout", "rollouts"))
+        assert len(rollouts) == len(demonstrations) == 7
+        for rollout, demonstration in zip(rollouts.trajectories, demonstrations.trajectories, strict=True):
+            np.testing.assert_allclose(
+                rollout.channels["position_m"][0], demonstration.channels["position_m"][0], atol=1e-6
+            )
+            assert rollout.duration_s == pytest.approx(demonstration.duration_s)
+
+    def test_the_exported_model_equals_the_trained_one(self, linear):
+        import mlflow
+
+        from geomotion import models
+
+        mlflow.set_tracking_uri(f"sqlite:///{linear.artefact('export', '').parents[2]}/mlflow.db")
+        policy = mlflow.pyfunc.load_model(f"runs:/{linear.document['stages']['export']['run_id']}/policy")
+        skill = models.load(linear.artefact("train", "model.pt"))
+        box = torch.rand(50, 2, generator=torch.Generator().manual_seed(0)) * 0.1
+        with torch.no_grad():
+            expected = skill.field(box).numpy()
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(policy.predict(box.numpy()), expected, atol=1e-5 * scale)
+
+    def test_standard_error_tells_the_stages_and_nothing_else(self, linear):
+        assert [line.partition(":")[0] for line in linear.err.splitlines()] == list(STAGES)
+
+    def test_the_same_command_again_reuses_every_stage(self, linear, here):
+        again = done(here("run", "dataset=letters/j", *TOY, "output=json"))
+        assert again.document["stages"] == linear.document["stages"]
+        lines = again.err.splitlines()
+        assert lines[0].startswith("ingest: done")  # the outside world is read anew each time
+        assert [bool(re.fullmatch(r"\w+: reused run [0-9a-f]{8}", line)) for line in lines[1:]] == [True] * 5
+
+    def test_the_thesis_field_is_measured_and_found_not_to_contract(self, line_integral):
+        certificate = line_integral.read("evaluate", "certificate.json")
+        assert certificate["claim"] == "measured_only"
+        assert certificate["rate_per_s"] is None
+        share = line_integral.document["scores"]["scores"]["contraction.true.non_contracting_fraction"]["value"]
+        assert 0 <= share <= 1
+        assert certificate["audit"]["contraction.true.non_contracting_fraction"] == share
+        page = line_integral.artefact("report", "report.html").read_text()
+        assert "measured" in page.lower()
+
+
+class TestOneTrainedRun:
+    """``run=`` names it by id, by a beginning of the id, by a path, or as the latest."""
+
+    def test_every_name_of_a_run_finds_the_same_model(self, linear, here):
+        train = linear.document["stages"]["train"]
+        names = (train["run_id"], train["run_id"][:10], train["folder"], linear.document["run_id"])
+        for name in names:
+            assert done(here("train", f"run={name}", "output=json")).document["stages"]["train"] == train
+
+    def test_latest_is_the_one_used_last(self, linear, line_integral, here):
+        for answer in (linear, line_integral):
+            train = answer.document["stages"]["train"]
+            done(here("train", f"run={train['run_id']}"))
+            assert done(here("train", "run=latest", "output=json")).document["stages"]["train"] == train
+
+    def test_another_evaluation_needs_no_training(self, linear, here):
+        train = linear.document["stages"]["train"]["run_id"]
+        settings = [setting for setting in TOY if setting.startswith("evaluation.")]
+        answer = done(here("eval", f"run={train}", *settings, "evaluation=peers", "output=json"))
+        assert answer.document["scores"]["protocol"] == "peers"
+        assert answer.document["stages"]["train"]["run_id"] == train
+        assert "train: " not in answer.err
+        assert "heldout.dtw" not in answer.document["scores"]["scores"]
+
+    def test_a_rollout_starts_where_it_is_told(self, linear, here):
+        from geomotion.demos import storage
+
+        train = linear.document["stages"]["train"]["run_id"]
+        where = ("rollout.starts_m=[[0.02,0.03],[0.01,0.0]]", "rollout.duration_s=1.5", "rollout.points=20")
+        answer = done(here("rollout", f"run={train}", *where, "output=json"))
+        rollouts = storage.load(answer.artefact("rollout", "rollouts"))
+        starts = [one.channels["position_m"][0] for one in rollouts.trajectories]
+        np.testing.assert_allclose(starts, [[0.02, 0.03], [0.01, 0.0]], atol=1e-6)
+        assert [(len(one), one.duration_s) for one in rollouts.trajectories] == [(20, 1.5)] * 2
+        assert len(answer.document["rollouts"]["rollouts"]) == 2
+
+    def test_a_report_is_written_of_a_run(self, linear, here):
+        settings = [setting for setting in TOY if setting.startswith("evaluation.")]
+        answer = done(here("report", f"run={linear.document['run_id']}", *settings, "output=json"))
+        assert Path(answer.document["report"]).read_text().startswith("<!doctype html>")
+
+    def test_runs_are_compared(self, linear, line_integral, here):
+        runs = [answer.document["stages"]["train"]["run_id"] for answer in (linear, line_integral)]
+        settings = [setting for setting in TOY if setting.startswith("evaluation.")]
+        answer = done(here("compare", f"runs=[{','.join(runs)}]", *settings, "output=json"))
+        assert answer.document["comparison"]
+        text = done(here("compare", f"runs=[{','.join(runs)}]", *settings)).out
+        assert "dtwd_per_point" in text
+
+    def test_a_training_override_beside_run_is_refused(self, linear, here):
+        answer = here("eval", f"run={linear.document['run_id']}", "training.steps=5")
+        assert (answer.status, answer.out) == (2, "")
+        assert answer.err.startswith("ncds eval: error: training.steps=5 is not valid")
+        assert answer.err.count("\n") == 1
+
+
+def test_ingest_prints_a_table_and_is_one_document_for_programs(linear, here):
+    for program in ("gms", "ncds"):
+        answer = done(here("ingest", "dataset=letters/s", "dataset.points=60", program=program))
+        picture = re.search(r"^picture  (.*)$", answer.out, re.MULTILINE)
+        assert Path(picture[1]).read_bytes().startswith(b"\x89PNG")
+        document = done(here("ingest", "dataset=letters/s", "dataset.points=60", "output=json", program=program))
+        assert len(document.document["summary"]["demos"]) == 7
+
+
+def test_commands_at_the_same_time_on_a_fresh_store_succeed_with_the_same_scores(linear, tmp_path):
+    commands = (
+        ("run", "dataset=letters/j", *TOY, "output=json"),
+        ("run", "dataset=letters/j", *TOY, "output=json"),
+        ("train", "dataset=letters/c", *TOY, "output=json"),
+    )
+    answers = [finish(process) for process in [start(tmp_path, *command) for command in commands]]
+    assert [answer.status for answer in answers] == [0, 0, 0], [answer.err for answer in answers]
+    assert answers[0].document["stages"] == answers[1].document["stages"]
+    assert answers[0].document["stages"]["train"] != answers[2].document["stages"]["train"]
+    # a fresh store and a repeated training change nothing: the seed decides
+    assert answers[0].document["scores"] == linear.document["scores"]
+
+
+def test_a_sweep_keeps_what_succeeds_and_fails_for_what_does_not(folder, linear, here):
+    settings = [setting for setting in TOY if not setting.startswith("training.")]
+    answer = call(
+        folder, "train", "-m", "dataset=letters/j", *settings,
+        "training.steps=8", "training.learning_rate=0.01,1e30,0.02", "output=json",
+    )  # fmt: skip
+    assert answer.status == 1
+    first, failed, last = (json.loads(line) for line in answer.out.splitlines())
+    assert failed["error"]["type"] == "TrainingDiverged"
+    assert len([line for line in answer.err.splitlines() if "error" in line]) == 1
+    for document in (first, last):
+        assert done(here("train", f"run={document['run_id']}", "output=json")).document["certificate"]

@@ -1,0 +1,55 @@
+import os
+import signal
+
+import pytest
+
+from geomotion.errors import Interrupted
+from geomotion.interrupts import interrupts_as_errors, postponed_interrupts
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_is_an_error_of_ours_at_the_end_of_the_block(number):
+    with pytest.raises(Interrupted) as stopped, interrupts_as_errors():
+        os.kill(os.getpid(), number)
+    assert stopped.value.exit_code == 128 + number
+
+
+def test_nobody_inside_takes_a_signal_for_damage():
+    with pytest.raises(Interrupted), interrupts_as_errors():
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+        except Exception as error:  # as readers of files and databases do
+            raise ValueError("this file cannot be read") from error
+
+
+def test_a_postponed_signal_waits_for_a_safe_point():
+    done = []
+    with pytest.raises(Interrupted), postponed_interrupts() as pending:
+        for step in range(3):
+            if step == 1:
+                os.kill(os.getpid(), signal.SIGTERM)
+            done.append(step)
+            pending.raise_if_set()
+    assert done == [0, 1]
+
+
+def test_a_signal_after_the_last_safe_point_is_not_lost():
+    with pytest.raises(Interrupted), postponed_interrupts():
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+def test_the_second_signal_stops_at_once():
+    done = []
+    with pytest.raises(Interrupted), interrupts_as_errors(), postponed_interrupts():
+        os.kill(os.getpid(), signal.SIGINT)
+        done.append(1)
+        os.kill(os.getpid(), signal.SIGINT)
+        done.append(2)
+    assert done == [1]
+
+
+def test_handlers_are_put_back():
+    before = signal.getsignal(signal.SIGINT)
+    with interrupts_as_errors(), postponed_interrupts():
+        assert signal.getsignal(signal.SIGINT) != before
+    assert signal.getsignal(signal.SIGINT) == before
