@@ -137,8 +137,8 @@ def _download(folder: Path) -> None:
     try:
         # The package retries for up to two minutes; ask first whether anybody answers.
         urlopen(DATASET_URL, timeout=PROBE_TIMEOUT_S).close()
-        _log.warning("downloading LASA handwriting from %s to %s", SITE, folder)
+        _log.info("downloading LASA handwriting from %s to %s", SITE, folder)
         with redirect_stdout(io.StringIO()):
             _ = DataSet.names
     except (OSError, HTTPException) as error:
-        _log.info("LASA handwriting could not be downloaded: %s", error)
+        _log.debug("LASA handwriting could not be downloaded: %s", error)
