@@ -1,5 +1,6 @@
 import os
 import signal
+import time
 
 import pytest
 
@@ -20,6 +21,18 @@ def test_nobody_inside_takes_a_signal_for_damage():
             os.kill(os.getpid(), signal.SIGINT)
         except Exception as error:  # as readers of files and databases do
             raise ValueError("this file cannot be read") from error
+
+
+def test_a_signal_that_arrives_where_exceptions_are_lost_still_counts(capfd):
+    class Leaving:
+        def __del__(self):
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    with pytest.raises(Interrupted), interrupts_as_errors():
+        leaving = Leaving()
+        del leaving
+        time.sleep(10)
+    assert capfd.readouterr().err == ""
 
 
 def test_a_postponed_signal_waits_for_a_safe_point():

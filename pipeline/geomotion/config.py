@@ -390,6 +390,7 @@ class TrajectoryTraining(TrainingConfig):
     nearest_point_weight: float = 5.0  # squared distance between whole curves
     nearest_point_mean_weight: float = 1.5  # distance between whole curves
     velocity_weight: float = 0.1
+    haste_weight: float = 0.05  # on speeds above the fastest demonstrated one, around the demonstrations
     weight_penalty: float = 1e-5  # on the chart's squared parameters
     mixing: float = 0.5  # similar demonstrations are mixed in pairs by up to this share
     starts: int = 4  # of each demonstration in each step
@@ -397,10 +398,13 @@ class TrajectoryTraining(TrainingConfig):
     curve_points: int = 64
     curve_stride: int = 8  # every eighth point of a demonstration takes part in the nearest-point term
     velocity_points: int = 256
+    haste_points: int = 128
+    surroundings: float = 0.3  # margin around the demonstrations, of their size, in which haste is penalised
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_positive("training", self, "times", "curve_stride", "velocity_points")
+        _require_positive("training", self, "times", "curve_stride", "velocity_points", "haste_points")
+        _require(self.surroundings >= 0, "training.surroundings", self.surroundings, "0 or more")
         _require(self.starts >= 2, "training.starts", self.starts, "2 or more")
         _require(self.curve_points >= 2, "training.curve_points", self.curve_points, "2 or more")
         for name in ("warm_up", "mixing"):

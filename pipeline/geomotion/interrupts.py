@@ -1,6 +1,9 @@
 """Ctrl-C and termination signals as an exception that stages can postpone to a safe point."""
 
+import os
 import signal
+import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -8,6 +11,7 @@ from types import FrameType
 from geomotion.errors import Interrupted
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+REPEAT_AFTER_S = 0.02
 HINT = "Repeat the command to continue where it stopped."
 
 
@@ -39,7 +43,7 @@ def interrupts_as_errors() -> Iterator[None]:
         raise StopRequest(number)
 
     try:
-        with _handlers(handle):
+        with _handlers(handle), _lost_requests_sent_again():
             yield
     except StopRequest as stop:
         raise Interrupted(stop.signal_number, HINT) from stop
@@ -58,6 +62,26 @@ def postponed_interrupts() -> Iterator[PendingInterrupt]:
     with _handlers(handle):
         yield pending
     pending.raise_if_set()  # a signal after the loop's last look
+
+
+@contextmanager
+def _lost_requests_sent_again() -> Iterator[None]:
+    """Finalisers and callbacks of weak references swallow exceptions: repeat a signal that arrives in one of them."""
+    before = sys.unraisablehook
+
+    def hook(lost: "sys.UnraisableHookArgs") -> None:
+        if isinstance(lost.exc_value, StopRequest):
+            timer = threading.Timer(REPEAT_AFTER_S, os.kill, (os.getpid(), lost.exc_value.signal_number))
+            timer.daemon = True
+            timer.start()
+        else:
+            before(lost)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 @contextmanager

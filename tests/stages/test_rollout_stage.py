@@ -135,3 +135,15 @@ def test_the_verb_takes_an_obstacle_beside_a_trained_run(fresh_store):
     assert row["method"] == "rk4"
     assert 0.1 < row["clearance_m"] < 1.5
     assert "clearance" in result.text
+
+
+def test_a_rollout_that_becomes_infinite_is_kept_as_far_as_it_is_finite(inputs, run):
+    starts = schema.RolloutConfig(starts_m=[[0.1, 0.01]], duration_s=1e6, points=200)
+    coarse = schema.SolverConfig(method=schema.SolverMethod.rk4)
+    rollout(RolloutStageConfig(starts, coarse, schema.NoObstacle()), inputs, run)
+    (kept,) = storage.load(run.folder / "rollouts").trajectories
+    assert 2 <= len(kept) < 200
+    document = read_json(run.folder / "rollouts.json")
+    (row,) = document["rollouts"]
+    assert (row["status"], row["distance_to_goal_m"]) == ("diverged", None)
+    assert "infinite" in rollout_table(document)

@@ -49,8 +49,8 @@ def test_the_true_system_has_almost_no_loss(objective_and_model):
 
 def test_the_nearest_point_term_begins_after_the_warm_up(objective_and_model):
     objective, model, _ = objective_and_model
-    assert set(objective(model, 0.39, generator())) == {"velocity", "weights", "equal_time"}
-    assert set(objective(model, 0.41, generator())) == {"velocity", "weights", "equal_time", "nearest_point"}
+    assert set(objective(model, 0.39, generator())) == {"velocity", "haste", "weights", "equal_time"}
+    assert set(objective(model, 0.41, generator())) == {"velocity", "haste", "weights", "equal_time", "nearest_point"}
 
 
 def test_the_same_generator_gives_the_same_losses(objective_and_model):
@@ -82,3 +82,10 @@ def test_curves_are_paired_with_those_that_are_like_them():
     assert nearest_curves(curves, 1).flatten().tolist() == [1, 0, 3, 2]
     assert nearest_curves(curves, 2).tolist() == [[1, 2], [0, 2], [3, 1], [2, 1]]
     assert nearest_curves(curves[:1], 2).tolist() == [[0]]
+
+
+def test_only_speeds_above_the_demonstrated_ones_count_as_haste(objective_and_model):
+    objective, _, _ = objective_and_model
+    slow = objective.top_speed * torch.tensor([[0.5, 0.0], [0.0, -1.0]])
+    assert float(objective._haste(slow)) < 1e-10
+    assert float(objective._haste(3 * slow)) > 0.1

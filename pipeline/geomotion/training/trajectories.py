@@ -35,7 +35,8 @@ class TrajectoryReproduction:
     Each step draws starts on the demonstrations, the first of them their beginnings, and times after each. Half of the
     starts lie on mixtures of two similar demonstrations, x_i + λ (x_j - x_i), which stand for the repetitions that a
     person did not show: without them the field learns the starts of the training set by heart. After a warm-up, the
-    nearest-point term compares whole curves, which lets the shape count more than the timing.
+    nearest-point term compares whole curves, which lets the shape count more than the timing. Beside the
+    demonstrations, where nothing is known, only haste is held against the field.
 
     Args:
         data: Demonstrations.
@@ -53,6 +54,9 @@ class TrajectoryReproduction:
         self.curve_stride = min(settings.curve_stride, self.curves.times.shape[1] // 2)  # a curve has two points
         self.states = data.all_states
         self.velocities = data.all_velocities
+        margin = settings.surroundings * (self.states.amax(0) - self.states.amin(0))
+        self.surroundings = self.states.amin(0) - margin, self.states.amax(0) + margin
+        self.top_speed = self.velocities.norm(dim=-1).max()
         self.mean_square_speed = self.velocities.square().sum(-1).mean()
 
     def __call__(self, model: ChartedField, progress: float, generator: torch.Generator) -> Losses:
@@ -67,21 +71,26 @@ class TrajectoryReproduction:
         # one pass through ψ for velocities, starts and goal, one through its inverse for all trajectories
         chart, field = model.chart, model.field
         assert isinstance(chart, AnchoredChart) and isinstance(field, SolvableField)
-        queried = torch.cat([self.states[chosen], self._to_metres(starts).flatten(0, 1), chart.anchor[None]])
+        known = torch.cat([self.states[chosen], self._anywhere(generator)])
+        queried = torch.cat([known, self._to_metres(starts).flatten(0, 1), chart.anchor[None]])
         z, push_forward = chart.chart.linearise(queried)
         image = z[-1]
-        velocity = push_forward(field(z - image))[: len(chosen)] / model.time_unit_s
-        latent_starts = (z[len(chosen) : -1] - image).view(starts.shape)
+        velocities = push_forward(field(z - image))[: len(known)] / model.time_unit_s
+        latent_starts = (z[len(known) : -1] - image).view(starts.shape)
         paths = [field.solve(latent_starts, elapsed).flatten(0, 2)]
         if curve_term:
             paths.append(field.solve(latent_starts[:, first], curve_times).flatten(0, 1))
         x = self._from_metres(chart.chart.to_ambient(torch.cat(paths) + image))
 
-        error = (velocity - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
+        error = (velocities[: len(chosen)] - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
         equal_time = (x[: len(paths[0])].view(targets.shape) - targets).square().sum(-1).mean()
         squares = [parameter.square().sum() for parameter in chart.parameters()]
-        size = torch.stack(squares).sum() if squares else torch.zeros(())
-        losses = {"velocity": settings.velocity_weight * error, "weights": settings.weight_penalty * size}
+        size = torch.stack(squares).sum() if squares else torch.zeros(())  # the identity has no parameters
+        losses = {
+            "velocity": settings.velocity_weight * error,
+            "haste": settings.haste_weight * self._haste(velocities[len(chosen) :]),
+            "weights": settings.weight_penalty * size,
+        }
         if not curve_term:
             return losses | {"equal_time": settings.equal_time_warm_up_weight * equal_time}
         curve = x[len(paths[0]) :].view(*curve_times.shape, -1)
@@ -107,6 +116,16 @@ class TrajectoryReproduction:
 
     def _to_metres(self, states: Tensor) -> Tensor:
         return states * self.scale_m + self.centre
+
+    def _anywhere(self, generator: torch.Generator) -> Tensor:
+        """Random states around the demonstrations [m]."""
+        low, high = self.surroundings
+        return low + (high - low) * torch.rand(self.settings.haste_points, len(low), generator=generator)
+
+    def _haste(self, velocities: Tensor) -> Tensor:
+        """How far speeds exceed the fastest demonstrated one; the logarithm keeps single wild states from ruling."""
+        excess: Tensor = (velocities.norm(dim=-1) / self.top_speed - 1).relu()
+        return excess.log1p().square().mean()
 
     def _mix(self, generator: torch.Generator) -> Curves:
         """Each demonstration moved towards, or away from, one that is like it."""
