@@ -26,7 +26,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $@
 
 demo: $(STAMP)  ## the main job on generated handwriting: train, roll out, score; ends with the report's path
-	$(BIN)/ncds run dataset=letters/j
+	$(BIN)/ncds run dataset=letters/j training.haste_weight=0.05
 
 test: $(STAMP)  ## all tests
 	$(BIN)/python -m pytest

@@ -390,7 +390,7 @@ class TrajectoryTraining(TrainingConfig):
     nearest_point_weight: float = 5.0  # squared distance between whole curves
     nearest_point_mean_weight: float = 1.5  # distance between whole curves
     velocity_weight: float = 0.1
-    haste_weight: float = 0.05  # on speeds above the fastest demonstrated one, around the demonstrations
+    haste_weight: float = 0.0  # on speeds above the fastest demonstrated one, around the demonstrations; try 0.05
     weight_penalty: float = 1e-5  # on the chart's squared parameters
     mixing: float = 0.5  # similar demonstrations are mixed in pairs by up to this share
     starts: int = 4  # of each demonstration in each step
@@ -407,6 +407,7 @@ class TrajectoryTraining(TrainingConfig):
         _require(self.surroundings >= 0, "training.surroundings", self.surroundings, "0 or more")
         _require(self.starts >= 2, "training.starts", self.starts, "2 or more")
         _require(self.curve_points >= 2, "training.curve_points", self.curve_points, "2 or more")
+        _require(self.haste_weight >= 0, "training.haste_weight", self.haste_weight, "0 or more")
         for name in ("warm_up", "mixing"):
             _require(0 <= getattr(self, name) <= 1, f"training.{name}", getattr(self, name), "a share between 0 and 1")
 

@@ -49,8 +49,8 @@ def test_the_true_system_has_almost_no_loss(objective_and_model):
 
 def test_the_nearest_point_term_begins_after_the_warm_up(objective_and_model):
     objective, model, _ = objective_and_model
-    assert set(objective(model, 0.39, generator())) == {"velocity", "haste", "weights", "equal_time"}
-    assert set(objective(model, 0.41, generator())) == {"velocity", "haste", "weights", "equal_time", "nearest_point"}
+    assert set(objective(model, 0.39, generator())) == {"velocity", "weights", "equal_time"}
+    assert set(objective(model, 0.41, generator())) == {"velocity", "weights", "equal_time", "nearest_point"}
 
 
 def test_the_same_generator_gives_the_same_losses(objective_and_model):
@@ -89,3 +89,10 @@ def test_only_speeds_above_the_demonstrated_ones_count_as_haste(objective_and_mo
     slow = objective.top_speed * torch.tensor([[0.5, 0.0], [0.0, -1.0]])
     assert float(objective._haste(slow)) < 1e-10
     assert float(objective._haste(3 * slow)) > 0.1
+
+
+def test_haste_is_part_of_the_loss_where_it_has_a_weight(spirals):
+    geometry = Geometry.of(spirals)
+    model = build(ModelConfig(FlowChart(layers=2), LinearField(), NoRegulariser(), 0), geometry).train()
+    losses = TrajectoryReproduction(spirals, geometry, TrajectoryTraining(haste_weight=0.05))(model, 0.0, generator())
+    assert set(losses) == {"velocity", "haste", "weights", "equal_time"}

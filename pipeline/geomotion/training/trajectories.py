@@ -36,7 +36,7 @@ class TrajectoryReproduction:
     starts lie on mixtures of two similar demonstrations, x_i + λ (x_j - x_i), which stand for the repetitions that a
     person did not show: without them the field learns the starts of the training set by heart. After a warm-up, the
     nearest-point term compares whole curves, which lets the shape count more than the timing. Beside the
-    demonstrations, where nothing is known, only haste is held against the field.
+    demonstrations, where nothing is known, haste can be held against the field.
 
     Args:
         data: Demonstrations.
@@ -71,7 +71,9 @@ class TrajectoryReproduction:
         # one pass through ψ for velocities, starts and goal, one through its inverse for all trajectories
         chart, field = model.chart, model.field
         assert isinstance(chart, AnchoredChart) and isinstance(field, SolvableField)
-        known = torch.cat([self.states[chosen], self._anywhere(generator)])
+        known = self.states[chosen]
+        if settings.haste_weight > 0:
+            known = torch.cat([known, self._anywhere(generator)])
         queried = torch.cat([known, self._to_metres(starts).flatten(0, 1), chart.anchor[None]])
         z, push_forward = chart.chart.linearise(queried)
         image = z[-1]
@@ -86,11 +88,9 @@ class TrajectoryReproduction:
         equal_time = (x[: len(paths[0])].view(targets.shape) - targets).square().sum(-1).mean()
         squares = [parameter.square().sum() for parameter in chart.parameters()]
         size = torch.stack(squares).sum() if squares else torch.zeros(())  # the identity has no parameters
-        losses = {
-            "velocity": settings.velocity_weight * error,
-            "haste": settings.haste_weight * self._haste(velocities[len(chosen) :]),
-            "weights": settings.weight_penalty * size,
-        }
+        losses = {"velocity": settings.velocity_weight * error, "weights": settings.weight_penalty * size}
+        if settings.haste_weight > 0:
+            losses["haste"] = settings.haste_weight * self._haste(velocities[len(chosen) :])
         if not curve_term:
             return losses | {"equal_time": settings.equal_time_warm_up_weight * equal_time}
         curve = x[len(paths[0]) :].view(*curve_times.shape, -1)
