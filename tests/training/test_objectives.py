@@ -126,7 +126,9 @@ def test_penalties_leave_the_chart_alone(data):
 
 def test_penalised_states_fill_the_enlarged_box(data):
     settings = schema.VelocityTraining(curl_points=4000, curl_margin=0.5)
-    x = VelocityReconstruction(data, Geometry.of(data), settings)._random_states(torch.Generator().manual_seed(0))
+    x = VelocityReconstruction(data, Geometry.of(data), settings).surroundings.draw(
+        settings.curl_points, torch.Generator().manual_seed(0)
+    )
     extent = BOX_UPPER - BOX_LOWER
     assert_close(x.amin(0), BOX_LOWER - 0.5 * extent, atol=1e-3, rtol=0)
     assert_close(x.amax(0), BOX_UPPER + 0.5 * extent, atol=1e-3, rtol=0)

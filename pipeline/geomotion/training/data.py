@@ -7,7 +7,8 @@ import numpy as np
 import torch
 
 from geomotion.demos.demonstrations import Demonstrations
-from geomotion.types import Float, Tensor
+from geomotion.scores.grids import bounding_box
+from geomotion.types import Float, States, Tensor
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,24 @@ class TrainingSet:
     def all_velocities(self) -> Float[Tensor, "point D"]:
         """Velocities of all demonstrations."""
         return torch.cat(self.velocities)
+
+
+class Surroundings:
+    """The box around demonstrations, from which penalties draw states where nothing was shown.
+
+    Args:
+        data: Demonstrations.
+        margin: By how much the box is larger on each side, in sizes of the bounding box.
+    """
+
+    def __init__(self, data: TrainingSet, margin: float) -> None:
+        box = bounding_box([states.numpy() for states in data.states]).enlarged(margin)
+        self.lower, self.upper = torch.from_numpy(box.lower), torch.from_numpy(box.upper)
+
+    def draw(self, count: int, generator: torch.Generator) -> States:
+        """Random states [m], uniform in the box."""
+        share = torch.rand(count, len(self.lower), generator=generator)
+        return self.lower + share * (self.upper - self.lower)
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,8 @@ import torch
 from geomotion.config import VelocityTraining
 from geomotion.dynamics.fields import ChartedField
 from geomotion.dynamics.line_integral import LineIntegralField
-from geomotion.scores.grids import bounding_box
 from geomotion.scores.jacobians import field_jacobian
-from geomotion.training.data import Geometry, TrainingSet
+from geomotion.training.data import Geometry, Surroundings, TrainingSet
 from geomotion.training.trainer import Losses
 from geomotion.types import Float, States, Tensor
 
@@ -30,8 +29,7 @@ class VelocityReconstruction:
         self.velocities = data.all_velocities
         self.batch_points = min(settings.batch_points, len(self.states))
         self.speed_m_per_s = geometry.scale_m / geometry.duration_s
-        box = bounding_box([states.numpy() for states in data.states]).enlarged(settings.curl_margin)
-        self.lower, self.upper = torch.from_numpy(box.lower), torch.from_numpy(box.upper)
+        self.surroundings = Surroundings(data, settings.curl_margin)
 
     def __call__(self, model: ChartedField, progress: float, generator: torch.Generator) -> Losses:
         chosen = torch.randint(len(self.states), (self.batch_points,), generator=generator)
@@ -41,13 +39,9 @@ class VelocityReconstruction:
         if isinstance(model.field, LineIntegralField):
             losses["regulariser"] = model.field.regularisation(_latent(model, states))
             if self.settings.curl_weight > 0:
-                anywhere = _latent(model, self._random_states(generator))
+                anywhere = _latent(model, self.surroundings.draw(self.settings.curl_points, generator))
                 losses["curl"] = self.settings.curl_weight * curl_penalty(model.field, anywhere)
         return losses
-
-    def _random_states(self, generator: torch.Generator) -> States:
-        share = torch.rand(self.settings.curl_points, len(self.lower), generator=generator)
-        return self.lower + share * (self.upper - self.lower)
 
 
 def curl_penalty(field: LineIntegralField, x: States) -> Float[Tensor, ""]:

@@ -8,7 +8,7 @@ import torch
 from geomotion.config import TrajectoryTraining
 from geomotion.dynamics.charts import AnchoredChart
 from geomotion.dynamics.fields import ChartedField, SolvableField
-from geomotion.training.data import Geometry, TrainingSet
+from geomotion.training.data import Geometry, Surroundings, TrainingSet
 from geomotion.training.trainer import Losses
 from geomotion.types import Float, Int, Tensor
 
@@ -54,8 +54,7 @@ class TrajectoryReproduction:
         self.curve_stride = min(settings.curve_stride, self.curves.times.shape[1] // 2)  # a curve has two points
         self.states = data.all_states
         self.velocities = data.all_velocities
-        margin = settings.surroundings * (self.states.amax(0) - self.states.amin(0))
-        self.surroundings = self.states.amin(0) - margin, self.states.amax(0) + margin
+        self.surroundings = Surroundings(data, settings.surroundings)
         self.top_speed = self.velocities.norm(dim=-1).max()
         self.mean_square_speed = self.velocities.square().sum(-1).mean()
 
@@ -73,7 +72,7 @@ class TrajectoryReproduction:
         assert isinstance(chart, AnchoredChart) and isinstance(field, SolvableField)
         known = self.states[chosen]
         if settings.haste_weight > 0:
-            known = torch.cat([known, self._anywhere(generator)])
+            known = torch.cat([known, self.surroundings.draw(settings.haste_points, generator)])
         queried = torch.cat([known, self._to_metres(starts).flatten(0, 1), chart.anchor[None]])
         z, push_forward = chart.chart.linearise(queried)
         image = z[-1]
@@ -116,11 +115,6 @@ class TrajectoryReproduction:
 
     def _to_metres(self, states: Tensor) -> Tensor:
         return states * self.scale_m + self.centre
-
-    def _anywhere(self, generator: torch.Generator) -> Tensor:
-        """Random states around the demonstrations [m]."""
-        low, high = self.surroundings
-        return low + (high - low) * torch.rand(self.settings.haste_points, len(low), generator=generator)
 
     def _haste(self, velocities: Tensor) -> Tensor:
         """How far speeds exceed the fastest demonstrated one; the logarithm keeps single wild states from ruling."""
