@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,6 +100,18 @@ class Demonstrations:
     def channel_names(self) -> tuple[str, ...]:
         """Channels that every demonstration has."""
         return tuple(self.trajectories[0].channels)
+
+    def description(self) -> dict[str, Any]:
+        """Everything but the samples, as JSON types; ``channels`` says how many axes each one has."""
+        return {
+            "name": self.name,
+            "space": self.space,
+            "frame": self.frame,
+            "source": self.source,
+            "licence": self.licence,
+            "steps": list(self.steps),
+            "channels": {name: values.shape[1] for name, values in self.trajectories[0].channels.items()},
+        }
 
     def select(self, indices: Sequence[int]) -> "Demonstrations":
         """The demonstrations with these numbers.

@@ -78,10 +78,6 @@ def _channels(demonstrations: Demonstrations, velocities: bool) -> list[str]:
     return [name for name in demonstrations.channel_names if (name in VELOCITY_OF.values()) == velocities]
 
 
-def _widths(demonstrations: Demonstrations) -> dict[str, int]:
-    return {name: values.shape[1] for name, values in demonstrations[0].channels.items()}
-
-
 def _samples(demonstrations: Demonstrations) -> "pa.Table":
     import pyarrow as pa
 
@@ -126,7 +122,8 @@ def _write_tasks(demonstrations: Demonstrations, path: Path) -> None:
 
 
 def _info(demonstrations: Demonstrations, folder: Path) -> dict[str, Any]:
-    widths = _widths(demonstrations)
+    description = demonstrations.description()
+    widths = description["channels"]
     features: dict[str, Any] = {}
     for column, velocities in COLUMN_OF_CHANNELS.items():
         names = [axis for name in _channels(demonstrations, velocities) for axis in column_names(name, widths[name])]
@@ -148,13 +145,7 @@ def _info(demonstrations: Demonstrations, folder: Path) -> dict[str, Any]:
         "video_path": None,
         "features": features,
         OWN_KEY: {
-            "name": demonstrations.name,
-            "space": demonstrations.space,
-            "frame": demonstrations.frame,
-            "source": demonstrations.source,
-            "licence": demonstrations.licence,
-            "steps": list(demonstrations.steps),
-            "channels": widths,
+            **description,
             "sha256": {name: _digest(folder / name) for name in (DATA, EPISODES)},
         },
     }

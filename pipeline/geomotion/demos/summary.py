@@ -19,13 +19,7 @@ def summarise(demonstrations: Demonstrations, config: DatasetConfig) -> dict[str
         for number, trajectory in enumerate(demonstrations.trajectories)
     ]
     return {
-        "name": demonstrations.name,
-        "space": demonstrations.space,
-        "frame": demonstrations.frame,
-        "source": demonstrations.source,
-        "licence": demonstrations.licence,
-        "steps": list(demonstrations.steps),
-        "channels": {name: values.shape[1] for name, values in demonstrations[0].channels.items()},
+        **demonstrations.description(),
         "summary_channel": channel,
         "unit": CHANNEL_UNITS[channel],
         "total": {
