@@ -18,20 +18,29 @@ LAYERS = (  # each may import those above it in this list, and itself
     {"dynamics"},
     {"obstacles"},
     {"scores"},
+    {"planning"},
     {"config"},
-    {"networks", "demos", "robot", "baselines"},
+    {"networks", "robot", "baselines", "obstacles_files"},
+    {"demos"},
     {"training"},
-    {"models", "export", "policy_model"},
+    {"models", "manifold_models", "export", "policy_model"},
     {"figures"},
     {"tracking"},
     {"stages"},
 )
 DEPTH = {name: depth for depth, names in enumerate(LAYERS) for name in names}
-MATHEMATICS = ("lie", "manifolds", "dynamics", "obstacles", "scores")
+MATHEMATICS = ("lie", "manifolds", "dynamics", "obstacles", "scores", "planning")
 MATHEMATICS_LIBRARIES = {"jaxtyping", "numpy", "roma", "scipy", "shapely", "torch", "torchdiffeq"}
 FRAMEWORKS = {"hydra", "mlflow", "omegaconf"}
 FRAMEWORK_USERS = {"config", "tracking", "stages", "policy_model"}  # the last is run by MLflow, outside of us
-CONFIG_READERS = {"demos", "models", "training", "tracking", "stages"}  # those built from settings; never mathematics
+CONFIG_READERS = {
+    "demos",
+    "models",
+    "manifold_models",
+    "training",
+    "tracking",
+    "stages",
+}  # those built from settings; never mathematics
 
 
 def imports(path: Path) -> Iterator[str]:

@@ -21,7 +21,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from geomotion.config import GmsConfig, Output
+from geomotion.config import CommandConfig, Output
 from geomotion.errors import Interrupted
 from geomotion_cli.failures import Failure, Reporter, UsageMistake, did_you_mean, pipeline_error, usage_error
 from geomotion_cli.hydra_errors import retell, unknown_setting
@@ -30,7 +30,7 @@ from geomotion_cli.streams import hydras_remark_removed, output_to_stderr
 if TYPE_CHECKING:
     from geomotion.stages.commands import VerbResult
 
-RunVerb = Callable[[str, GmsConfig, list[str]], "VerbResult"]
+RunVerb = Callable[[str, CommandConfig, list[str]], "VerbResult"]
 """Carries out a verb with its typed configuration and the overrides that were typed."""
 
 RUN_KEYS = ("run", "runs")
@@ -153,9 +153,9 @@ def _as_text(result: "VerbResult", output: Output) -> str:
     return json.dumps(result.document, allow_nan=False) if output is Output.json else result.text
 
 
-def _typed(config: DictConfig) -> GmsConfig:
+def _typed(config: DictConfig) -> CommandConfig:
     settings = OmegaConf.to_object(config)
-    assert isinstance(settings, GmsConfig)
+    assert isinstance(settings, CommandConfig)
     if foreign := _foreign_keys(settings):
         raise UsageMistake(unknown_setting(foreign[0], config))
     return settings

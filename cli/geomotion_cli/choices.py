@@ -1,5 +1,6 @@
 """The options that Hydra's configuration groups offer, sub-folders included."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import fields
 
@@ -8,15 +9,25 @@ from hydra.core.global_hydra import GlobalHydra
 from hydra.core.object_type import ObjectType
 from hydra.plugins.config_source import ConfigSource
 
-from geomotion.config import GmsConfig, NcdsConfig
+from geomotion.config import CommandConfig, GmsConfig, NcdsConfig
 
+CONFIG_TYPES: dict[str, type[CommandConfig]] = {"gms": GmsConfig, "ncds": NcdsConfig}
+_GMS_GROUPS = {"dataset", "obstacle", "experiment"}  # its other settings have one form each
+_GMS_EXPERIMENT = re.compile(r"thesis/(gms|fig_[34]_.*)|regression/gms_.*")  # chapters 3 and 4 of the thesis
 _INTERNAL_SUFFIX = "_schema"  # bases of other options, of no use by themselves
 
 
-def top_level_names(config_type: type[GmsConfig]) -> list[str]:
+def top_level_names(config_type: type[CommandConfig]) -> list[str]:
     """Everything that may stand before the first dot, slash or equals sign of an override."""
-    names = [item.name for item in fields(config_type)]
-    return [*names, "experiment"] if config_type is NcdsConfig else names
+    return [*(item.name for item in fields(config_type)), "experiment"]
+
+
+def program_options(program: str) -> dict[str, list[str]]:
+    """The options of one program, by group."""
+    found = group_options(*top_level_names(CONFIG_TYPES[program]))
+    is_gms = program == "gms"
+    found["experiment"] = [one for one in found["experiment"] if bool(_GMS_EXPERIMENT.fullmatch(one)) == is_gms]
+    return {group: options for group, options in found.items() if not is_gms or group in _GMS_GROUPS}
 
 
 def group_options(*groups: str) -> dict[str, list[str]]:

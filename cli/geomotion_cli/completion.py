@@ -37,19 +37,19 @@ def _options(program: str, words: list[str], unfinished: str, line: str) -> list
         case _ if unfinished.startswith("-"):
             return _FLAGS
         case [verb, *_]:
-            return _choices(unfinished) or _settings(program, _without_verb(line, verb))
+            return _choices(program, unfinished) or _settings(program, _without_verb(line, verb))
     return []
 
 
-def _choices(unfinished: str) -> list[str]:
+def _choices(program: str, unfinished: str) -> list[str]:
     """Options of a group, behind ``group=``; Hydra offers those of one folder only."""
-    from geomotion_cli.choices import group_options
+    from geomotion_cli.choices import program_options
 
     group, equals, value = unfinished.partition("=")
     if not equals or "." in group or "/" in group:
         return []
     chosen = value[: value.rfind(",") + 1]  # a sweep's earlier values
-    return [f"{group}={chosen}{option}" for option in group_options(group).get(group, [])]
+    return [f"{group}={chosen}{option}" for option in program_options(program).get(group, [])]
 
 
 def _settings(program: str, line: str) -> list[str]:

@@ -8,7 +8,7 @@ from hydra.errors import HydraException, MissingConfigException, OverrideParseEx
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, MissingMandatoryValue, OmegaConfBaseException
 
-from geomotion.config import GmsConfig
+from geomotion.config import CommandConfig
 from geomotion.errors import UnknownName
 from geomotion_cli.choices import group_options, top_level_names
 from geomotion_cli.failures import did_you_mean
@@ -73,7 +73,7 @@ def _settings_in(config: DictConfig, parent: str = "") -> list[str]:
     """Names declared directly below `parent`."""
     node = OmegaConf.select(config, parent, throw_on_resolution_failure=False) if parent else config
     kind = OmegaConf.get_type(node) if OmegaConf.is_dict(node) else None
-    if not parent and kind is not None and issubclass(kind, GmsConfig):
+    if not parent and kind is not None and issubclass(kind, CommandConfig):
         return top_level_names(kind)
     return [item.name for item in fields(kind)] if is_dataclass(kind) else []
 

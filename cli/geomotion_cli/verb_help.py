@@ -2,11 +2,9 @@
 
 import textwrap
 
-from geomotion.config import GmsConfig, NcdsConfig
-from geomotion_cli.choices import group_options, top_level_names
+from geomotion_cli.choices import program_options
 from geomotion_cli.verbs import PROGRAMS
 
-CONFIG_TYPES: dict[str, type[GmsConfig]] = {"gms": GmsConfig, "ncds": NcdsConfig}
 FLAGS = {
     "--cfg job": "print every setting with its value instead of running; add --resolve to fill in references",
     "-m": "sweep: one job for each combination of comma-separated values; hydra/launcher=joblib runs them in parallel",
@@ -37,8 +35,7 @@ def _table(rows: dict[str, str]) -> list[str]:
 
 
 def _choices(program: str) -> list[str]:
-    groups = top_level_names(CONFIG_TYPES[program])
     return [
         textwrap.fill(f"{group} = {' | '.join(options)}", _WIDTH, initial_indent="  ", subsequent_indent="      ")
-        for group, options in group_options(*groups).items()
+        for group, options in program_options(program).items()
     ]

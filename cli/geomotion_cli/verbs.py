@@ -50,10 +50,100 @@ _INGEST = Verb(
 )
 _UI = Verb("open the MLflow pages of the local store", _STORE, ("", "tracking.root=elsewhere/runs"))
 
+_DATASET_OF_POSES = {"dataset=panda/reach_to_grasp": "poses to learn from; every choice is listed below"}
+_MANIFOLD = {
+    "manifold.latent_dim=2": "dimension of the manifold: 2 or 3",
+    "manifold.antipodal=aligned": "or doubled, mixture: what is done about q and -q being one orientation",
+    "manifold.carry_ends=true": "learn demonstrations carried to one start and goal; false: as they are",
+}
+_PLANNING = {
+    "planning.start=demo:0 planning.goal=demo:3": "ends: demo:N, latent:A:B, or a pose [x,y,z,qw,qx,qy,qz]",
+    "planning.via=[demo:2]": "further poses on the way",
+    "planning.clearance_m=0.01": "distance kept to obstacles [m]",
+    "planning.tool_radius_m=0.0": "of a grasped object [m]",
+    "planning.leave_data_m=0.02": "how much farther from the demonstrations a path may go [m]",
+    "obstacle=sphere obstacle.centre_m=[0.5,0,0.3] obstacle.radius_m=0.05": "an obstacle [m]; also box, ellipsoid, "
+    "mesh, point_cloud, several",
+}
+_COMPARE = Verb(
+    "table of the scores of several runs",
+    {"runs=[ID,ID]": "MLflow run ids, paths or latest", **_JSON},
+    ("runs=[latest,0f3a]", "runs=[0f3a,77c1] output=json"),
+)
+_CHECK = Verb(
+    "repeat a small pinned experiment; fails where a score got worse than its stored baseline",
+    {
+        "check.baseline=PATH": "another baseline than the stored one",
+        "check.update=true": "store the new scores as the baseline",
+        **_JSON,
+    },
+    ("", "check.update=true"),
+)
+
 PROGRAMS = {
     "gms": Program(
-        "Geodesic motion skills: recordings of demonstrations, for now.",
-        {"ingest": _INGEST, "ui": _UI},
+        "Geodesic motion skills: demonstrated motion as shortest paths on a learned manifold, around obstacles.",
+        {
+            "run": Verb(
+                "the whole chain: ingest, train, graph, plan, eval, replay, report",
+                {**_DATASET_OF_POSES, **_MANIFOLD, **_PLANNING, **_TRAINING, **_JSON},
+                (
+                    "dataset=panda/reach_to_grasp",
+                    "dataset=robotasks9/wineglass",
+                    "-m dataset=robotasks9/wineglass,robotasks9/scoop seed=0,1,2",
+                ),
+            ),
+            "ingest": _INGEST,
+            "train": Verb(
+                "fit a manifold to demonstrated poses; continues where an interrupted training stopped",
+                {**_DATASET_OF_POSES, **_MANIFOLD, **_TRAINING, **_JSON},
+                ("dataset=robotasks9/wineglass", "dataset=panda/reach_to_grasp manifold.latent_dim=3"),
+            ),
+            "graph": Verb(
+                "decode the latent grid that geodesics are searched on",
+                {
+                    **_RUN,
+                    "graph.points_per_axis=100": "resolution",
+                    "metric.density_power=2": "how much geodesics keep to dense data; 0: the thesis' metric",
+                    **_JSON,
+                },
+                ("run=latest", "run=latest graph.points_per_axis=150"),
+            ),
+            "plan": Verb(
+                "find a geodesic between poses, around obstacles; exit status 3 where there is none",
+                {**_RUN, **_PLANNING, **_JSON},
+                (
+                    "run=latest",
+                    "run=latest planning.start=demo:0 planning.goal=demo:3",
+                    "run=latest obstacle=sphere obstacle.centre_m=[0.5,0,0.3] obstacle.radius_m=0.05",
+                    "run=latest obstacle=mesh obstacle.file=duck.obj obstacle.scale=0.1 obstacle.centre_m=[0.5,0,0.3]",
+                ),
+            ),
+            "eval": Verb(
+                "score geodesics between the ends of held-out demonstrations",
+                {**_RUN, **_JSON},
+                ("run=latest", "run=latest output=json"),
+            ),
+            "replay": Verb(
+                "execute a planned motion on the simulated Panda, replanning where obstacles move; makes a film",
+                {
+                    **_RUN,
+                    **_PLANNING,
+                    "robot.timing=demonstration": "or fastest: as fast as the joints' limits allow",
+                    "robot.frame=grasp_target": "or flange: which frame of the arm the poses are of",
+                    **_JSON,
+                },
+                (
+                    "run=latest",
+                    "run=latest obstacle=sphere obstacle.centre_m=[0.5,0,0.3] obstacle.radius_m=0.05 "
+                    "obstacle.velocity_m_per_s=[0,0.05,0]",
+                ),
+            ),
+            "report": Verb("write one HTML page about a run", {**_RUN, **_STORE}, ("run=latest",)),
+            "compare": _COMPARE,
+            "check": _CHECK,
+            "ui": _UI,
+        },
     ),
     "ncds": Program(
         "Neural contractive dynamical systems: vector fields learned from a handful of demonstrations.",
@@ -100,20 +190,8 @@ PROGRAMS = {
                 ("run=latest", "run=latest evaluation=peers output=json"),
             ),
             "report": Verb("write one HTML page about a run", {**_RUN, **_STORE}, ("run=latest",)),
-            "compare": Verb(
-                "table of the scores of several runs",
-                {"runs=[ID,ID]": "MLflow run ids, paths or latest", **_JSON},
-                ("runs=[latest,0f3a]", "runs=[0f3a,77c1] output=json"),
-            ),
-            "check": Verb(
-                "repeat a small pinned experiment; fails where a score got worse than its stored baseline",
-                {
-                    "check.baseline=PATH": "another baseline than the stored one",
-                    "check.update=true": "store the new scores as the baseline",
-                    **_JSON,
-                },
-                ("", "check.update=true"),
-            ),
+            "compare": _COMPARE,
+            "check": _CHECK,
             "ui": _UI,
         },
     ),

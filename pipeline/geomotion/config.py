@@ -28,6 +28,7 @@ STACKED_LASA_SHAPES = {
 }  # Sec. 6.4 stacks two and four shapes without naming them
 ROBOTASKS9_TASKS = ("bottle2shelf", "matfolding", "openbox", "pouring", "scoop", "wineglass")  # those with a checksum
 LETTERS = ("c", "j", "l", "n", "s", "sine", "u", "v", "w", "z")
+POURING_GROUPS = 3  # bottles, each poured into its own cup
 
 
 def _require(condition: bool, key: str, found: object, expected: str) -> None:
@@ -160,26 +161,73 @@ class FolderDataset(DatasetConfig):
 
 
 @dataclass
-class LettersDataset(DatasetConfig):
-    """Generated handwriting-like letters with human-like variation."""
+class GeneratedDataset(DatasetConfig):
+    """Motions made by formula; a repetition depends on the seed and its own number only."""
+
+    demos: int = 9
+    points: int = 200  # of each demonstration
+    duration_s: float = 4.0
+    variation: float = 1.0  # 0: identical repetitions; 1: about what people do
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _require_positive("dataset", self, "demos", "duration_s")
+        _require(self.points >= 2, "dataset.points", self.points, "2 or more")
+        _require(0 <= self.variation <= 3, "dataset.variation", self.variation, "a number from 0 to 3")
+        _require_seed("dataset.", self)
+
+
+@dataclass
+class LettersDataset(GeneratedDataset):
+    """Handwriting-like letters."""
 
     letter: str = MISSING
     demos: int = 7
     points: int = 400
     duration_s: float = 3.0
     size_m: float = 0.1
-    variation: float = 1.0  # 0: identical repetitions; 1: about what people do
-    seed: int = 0
     preprocess: PreprocessConfig = default(
         default_factory=lambda: PreprocessConfig(trim_start_points=15)  # pens start at rest; see LasaDataset
     )
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _require_known("letter", self.letter, LETTERS)
-        _require_positive("dataset", self, "demos", "duration_s", "size_m")
-        _require(self.points >= 2, "dataset.points", self.points, "2 or more")
-        _require(0 <= self.variation <= 3, "dataset.variation", self.variation, "a number from 0 to 3")
-        _require_seed("dataset.", self)
+        _require_positive("dataset", self, "size_m")
+
+
+@dataclass
+class JCDataset(GeneratedDataset):
+    """J-shaped positions in the plane with C-shaped directions on the sphere, Sec. 3.5.2."""
+
+    demos: int = 10
+    points: int = 100
+    duration_s: float = 3.0
+    size_m: float = 0.3  # height of the J
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("dataset", self, "size_m")
+
+
+@dataclass
+class PandaReachDataset(GeneratedDataset):
+    """Poses of the simulated Panda that reaches for three places in turn, to grasp from the side, Sec. 3.6.1."""
+
+
+@dataclass
+class PandaPouringDataset(GeneratedDataset):
+    """Poses of the simulated Panda that pours three bottles in turn, each into its own cup, Sec. 3.6.2."""
+
+    demos: int = 18  # six of every group
+    points: int = 150
+    duration_s: float = 6.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.train_demos is None and self.test_demos is None and self.demos >= 2 * POURING_GROUPS:
+            last = self.demos - POURING_GROUPS  # null: one of every group is held out
+            self.train_demos, self.test_demos = list(range(last)), list(range(last, self.demos))
 
 
 # ---------------------------------------------------------------- models
@@ -360,6 +408,129 @@ class EigenvalueRegulariser(SpreadRegulariser):
         _require_positive("regulariser", self, "epsilon")
 
 
+# ---------------------------------------------------------------- geodesic motion skills
+class Antipodal(Enum):
+    """What is done about q and -q being one orientation."""
+
+    aligned = "aligned"  # one sign: one cluster
+    doubled = "doubled"  # both signs are shown, each its own mean: two clusters, Fig. 3.1, Sec. 3.3
+    mixture = (
+        "mixture"  # both signs are shown and share one mean, Eq. (3.5): one cluster, whose decoded sign is arbitrary
+    )
+
+
+@dataclass
+class ManifoldConfig:
+    """The variational auto-encoder of poses, Ch. 3."""
+
+    latent_dim: int = 2  # Sec. 3.5.5
+    hidden_units: list[int] = default(default_factory=lambda: [200, 100])  # Sec. 3.5.5; reversed in the decoder
+    kernels: int = 500  # Sec. 3.5.5
+    bandwidth: float = 1.5  # of the kernels, times their median spacing; from 4 on the walls around the data are gone
+    largest_std: float = 100.0  # σ far from the data, times the size of the data
+    smallest_concentration: float = 1e-4  # κ far from the data
+    antipodal: Antipodal = Antipodal.aligned
+    points: int = 200  # of each demonstration
+    encode_progress: bool = True  # poses are encoded with their share of the motion; false: poses alone (Ch. 3)
+    carry_ends: bool = True  # learn demonstrations carried to one start and goal; false: as they are (Ch. 3)
+    mixed_copies: int = 5  # mixtures of two demonstrations of a group, for each demonstration; 0: none (Ch. 3)
+
+    def __post_init__(self) -> None:
+        _require_positive("manifold", self, "kernels", "bandwidth", "largest_std", "smallest_concentration")
+        _require(self.latent_dim in (2, 3), "manifold.latent_dim", self.latent_dim, "2 or 3: geodesics need a grid")
+        _require(self.points >= 10, "manifold.points", self.points, "10 or more")
+        _require(self.mixed_copies >= 0, "manifold.mixed_copies", self.mixed_copies, "0 or more")
+        _require_layer_widths("manifold", self.hidden_units)
+
+
+@dataclass
+class MetricConfig:
+    """The Riemannian metric, Sec. 3.4."""
+
+    density_power: float = 1.0  # p of f = (ρ₉₀/ρ)^p, lengths are multiplied by f; 0: the thesis' metric
+    density_bandwidth: float = 1.0  # of ρ, times the mean latent distance between demonstrations
+    raw_concentration: bool = False  # κ itself as in (3.13), which swamps the rest; false: the angle that belongs to it
+
+    def __post_init__(self) -> None:
+        _require(self.density_power >= 0, "metric.density_power", self.density_power, "0 or more")
+        _require_positive("metric", self, "density_bandwidth")
+
+
+@dataclass
+class GraphConfig:
+    """The decoded latent grid, Sec. 3.5.4."""
+
+    points_per_axis: int = 100  # Fig. 3.3
+    margin: float = 0.1  # around the encoded demonstrations, of their extent
+    memory_limit_gib: float = 4.0
+
+    def __post_init__(self) -> None:
+        _require(self.points_per_axis >= 10, "graph.points_per_axis", self.points_per_axis, "10 or more")
+        _require(self.margin >= 0, "graph.margin", self.margin, "0 or more")
+        _require_positive("graph", self, "memory_limit_gib")
+
+
+class ConstraintKind(Enum):
+    """How obstacles act on geodesics."""
+
+    hard = "hard"  # nodes and edges that might come too close are removed
+    soft = "soft"  # the ambient metric (3.15) alone: proves nothing, clearance is checked and reported
+    both = "both"
+
+
+class TimingLaw(Enum):
+    """Where a path gets its time from."""
+
+    demonstration = "demonstration"  # the mean timing of the demonstrations, slower where a joint limit demands it
+    fastest = "fastest"  # as fast as the joints' limits allow
+
+
+class EndEffectorFrame(Enum):
+    """Which frame of the arm the poses are of."""
+
+    grasp_target = "grasp_target"
+    flange = "flange"
+
+
+class ToolShape(Enum):
+    """What must not touch obstacles."""
+
+    auto = "auto"  # the hand where the arm replans among moving obstacles, otherwise the point
+    point = "point"  # the end effector's frame, or a ball of `tool_radius_m` around it, Sec. 3.5.3, 3.6.2
+    hand = "hand"  # the whole hand with open fingers, as balls that turn with the pose, and that ball
+
+
+@dataclass
+class PlanningConfig:
+    """Start, goal and how to get there."""
+
+    start: Any = None  # demo:N (its first pose), latent:A:B, or a pose [x,y,z,qw,qx,qy,qz]; null: a held-out one's
+    goal: Any = None  # demo:N (its last pose), latent:A:B, or a pose; null: that of the same demonstration
+    via: list[Any] = default(default_factory=list)  # goals on the way, each as above; also antipode:N, the end of
+    #   demonstration N with -q, where both signs were shown
+    others: list[Any] = default(default_factory=list)  # further [start, goal] pairs, planned apart and drawn with it
+    constraint: ConstraintKind = ConstraintKind.hard
+    clearance_m: float = 0.01
+    obstacle_gain: float = 100.0  # ζ of (3.15), for soft constraints
+    leave_data_m: float = 0.0  # how much farther from the data than other demonstrations a path may go
+    leave_data_rad: float = 0.0
+    tool: ToolShape = ToolShape.auto
+    tool_radius_m: float = 0.0  # of a grasped object, taken as a ball around the end effector, Sec. 3.6.2
+    spline_control_points: int = 12
+    samples: int = 200
+    refine_steps: int = 0  # gradient steps on the energy of the spline, (3.14)
+
+    def __post_init__(self) -> None:
+        for name in ("clearance_m", "obstacle_gain", "leave_data_m", "leave_data_rad", "tool_radius_m", "refine_steps"):
+            _require(getattr(self, name) >= 0, f"planning.{name}", getattr(self, name), "0 or more")
+        _require(
+            self.spline_control_points >= 4, "planning.spline_control_points", self.spline_control_points, "4 or more"
+        )
+        _require(self.samples >= 10, "planning.samples", self.samples, "10 or more")
+        for pair in self.others:
+            _require(isinstance(pair, list) and len(pair) == 2, "planning.others", pair, "pairs [start, goal]")
+
+
 # ---------------------------------------------------------------- training, rollouts, evaluation
 @dataclass
 class TrainingConfig:
@@ -431,6 +602,35 @@ class VelocityTraining(TrainingConfig):
 
 
 @dataclass
+class ManifoldTraining(TrainingConfig):
+    """Means of a pose manifold by (3.6) with fixed spreads, then the spreads by likelihood."""
+
+    steps: int = 4000
+    learning_rate: float = 2e-3
+    batch_points: int = 512
+    position_weight: float = 1.0  # β₁
+    orientation_weight: float = 1.0  # β₂
+    divergence_weight: float = 0.2  # of the divergence from the prior
+    warm_up: float = 0.3  # share of the steps over which the divergence comes in
+    fixed_std: float = 0.03  # σ while the means are trained, times the size of the data
+    fixed_concentration: float = 1000.0  # κ meanwhile
+    progress_std: float = 0.03
+    spread_steps: int = 800
+    spread_learning_rate: float = 0.05
+    restarts: int = 2  # with other seeds, where the latent space collapsed or is folded
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive(
+            "training", self, "batch_points", "position_weight", "orientation_weight", "fixed_std",
+            "fixed_concentration", "progress_std", "spread_steps", "spread_learning_rate",
+        )  # fmt: skip
+        _require(self.divergence_weight >= 0, "training.divergence_weight", self.divergence_weight, "0 or more")
+        _require(self.restarts >= 0, "training.restarts", self.restarts, "0 or more")
+        _require(0 <= self.warm_up <= 1, "training.warm_up", self.warm_up, "a share between 0 and 1")
+
+
+@dataclass
 class ObstacleConfig:
     """What stands in the way of rollouts."""
 
@@ -454,11 +654,22 @@ class Avoidance(ObstacleConfig):
 
 @dataclass
 class SolidObstacle(Avoidance):
-    """A body and its constant velocity; the coordinates are those of the state."""
+    """A body and its motion; the coordinates are those of the state."""
 
     centre_m: list[float] = MISSING
     velocity_m_per_s: list[float] | None = None  # null: at rest
+    path_m: list[Any] | None = None  # gms: places of the centre that it moves through, at `path_times_s`; null: none
+    path_times_s: list[float] | None = None
     rotation_rad: list[float] | None = None  # null: none; one angle in a plane, a rotation vector in space
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.path_m is not None or self.path_times_s is not None:
+            places, times = self.path_m or [], self.path_times_s or []
+            _require(len(places) == len(times) > 0, "obstacle.path_times_s", times, "one time for each place of path_m")
+            _require(
+                self.velocity_m_per_s is None, "obstacle.velocity_m_per_s", self.velocity_m_per_s, "null beside path_m"
+            )
 
 
 @dataclass
@@ -501,8 +712,33 @@ class BoxObstacle(SolidObstacle):
 
 
 @dataclass
+class MeshObstacle(SolidObstacle):
+    """Triangles from an .obj, .stl or .ply file; `centre_m` is where the file's origin is put."""
+
+    file: str = MISSING
+    scale: float = 1.0  # metres in a unit of the file
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("obstacle", self, "scale")
+
+
+@dataclass
+class PointCloudObstacle(SolidObstacle):
+    """Points from a .npy, .npz, .csv, .xyz or .ply file, each a small ball."""
+
+    file: str = MISSING
+    radius_m: float = 0.005
+    scale: float = 1.0  # metres in a unit of the file
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("obstacle", self, "radius_m", "scale")
+
+
+@dataclass
 class SeveralObstacles(Avoidance):
-    """Several bodies: shape (sphere, ellipsoid or box) with the keys of that shape."""
+    """Several bodies: shape (sphere, ellipsoid, box, mesh or point_cloud) with the keys of that shape."""
 
     bodies: list[Any] = MISSING
 
@@ -520,6 +756,8 @@ def _body(body: Any) -> SolidObstacle:
         "sphere": SphereObstacle,
         "ellipsoid": EllipsoidObstacle,
         "box": BoxObstacle,
+        "mesh": MeshObstacle,
+        "point_cloud": PointCloudObstacle,
     }
     _require_known("shape of an obstacle", str(body["shape"]), tuple(kinds))
     settings = {name: value for name, value in body.items() if name != "shape"}
@@ -642,21 +880,73 @@ class CheckConfig:
 
 
 @dataclass
-class GmsConfig:
-    """Configuration of every `gms` verb."""
+class RobotConfig:
+    """The simulated Panda."""
+
+    frame: EndEffectorFrame = EndEffectorFrame.grasp_target
+    timing: TimingLaw = TimingLaw.demonstration
+    duration_s: float | None = None  # null: the mean duration of the demonstrations
+    share_of_limits: float = 0.5  # of velocity, acceleration and jerk, for timing=fastest
+    table: bool = False  # recordings do not say where their table stood; true: one with its top at z = 0
+    film: bool = True
+    film_fps: float = 10.0
+    tool_length_m: float = 0.2  # of the grasped object, a cylinder of planning.tool_radius_m
+    closed_loop: bool | None = None  # replan while moving; null: where an obstacle moves
+    control_hz: float = 60.0
+    horizon_s: float = 1.0  # how far ahead moving obstacles are looked at
+
+    def __post_init__(self) -> None:
+        _require_positive("robot", self, "film_fps", "tool_length_m", "control_hz")
+        _require(0 < self.share_of_limits <= 1, "robot.share_of_limits", self.share_of_limits, "above 0, at most 1")
+        _require(self.horizon_s >= 0, "robot.horizon_s", self.horizon_s, "0 or more")
+        if self.duration_s is not None:
+            _require_positive("robot", self, "duration_s")
+
+
+@dataclass
+class GeodesicEvaluationConfig:
+    """Geodesics between the ends of demonstrations, judged against them."""
+
+    samples: int = 200  # points of every compared path
+    compare_methods: bool = False  # geodesics by gradient descent and on coarser and finer graphs as well, Fig. 3.3
+
+    def __post_init__(self) -> None:
+        _require(self.samples >= 10, "evaluation.samples", self.samples, "10 or more")
+
+
+@dataclass
+class CommandConfig:
+    """What every verb of both programs has."""
 
     dataset: DatasetConfig = MISSING
     tracking: TrackingConfig = default(default_factory=TrackingConfig)
     seed: int = 0
     reuse: bool = True
     output: Output = Output.text
+    run: str | None = None  # a trained run: latest, an MLflow run id, or a path
+    runs: list[str] = default(default_factory=list)  # for compare
+    check: CheckConfig = default(default_factory=CheckConfig)
 
     def __post_init__(self) -> None:
         _require_seed("", self)
 
 
 @dataclass
-class NcdsConfig(GmsConfig):
+class GmsConfig(CommandConfig):
+    """Configuration of every `gms` verb."""
+
+    manifold: ManifoldConfig = default(default_factory=ManifoldConfig)
+    training: ManifoldTraining = default(default_factory=ManifoldTraining)
+    metric: MetricConfig = default(default_factory=MetricConfig)
+    graph: GraphConfig = default(default_factory=GraphConfig)
+    planning: PlanningConfig = default(default_factory=PlanningConfig)
+    obstacle: ObstacleConfig = MISSING
+    robot: RobotConfig = default(default_factory=RobotConfig)
+    evaluation: GeodesicEvaluationConfig = default(default_factory=GeodesicEvaluationConfig)
+
+
+@dataclass
+class NcdsConfig(CommandConfig):
     """Configuration of every `ncds` verb."""
 
     chart: ChartConfig = MISSING
@@ -667,9 +957,6 @@ class NcdsConfig(GmsConfig):
     solver: SolverConfig = default(default_factory=SolverConfig)
     rollout: RolloutConfig = default(default_factory=RolloutConfig)
     evaluation: EvaluationConfig = default(default_factory=EvaluationConfig)
-    run: str | None = None  # a trained run: latest, an MLflow run id, or a path
-    runs: list[str] = default(default_factory=list)  # for compare
-    check: CheckConfig = default(default_factory=CheckConfig)
 
 
 def plain(value: object) -> Any:
@@ -697,6 +984,11 @@ def _dataset_choices() -> dict[str, dict[str, Any]]:
         "lasa": {choice: {"shapes": shapes} for choice, shapes in lasa.items()},
         "robotasks9": {task: {"task": task} for task in ROBOTASKS9_TASKS},
         "letters": {letter: {"letter": letter} for letter in LETTERS},
+        "generated": {"jc": {"defaults": ["jc_schema", "_self_"]}},
+        "panda": {
+            "reach_to_grasp": {"defaults": ["panda_reach_schema", "_self_"]},
+            "pouring_3x3": {"defaults": ["panda_pouring_schema", "_self_"]},
+        },
     }
 
 
@@ -725,6 +1017,8 @@ def register() -> None:
             "sphere": SphereObstacle,
             "ellipsoid": EllipsoidObstacle,
             "box": BoxObstacle,
+            "mesh": MeshObstacle(centre_m=[0.0, 0.0, 0.0]),
+            "point_cloud": PointCloudObstacle(centre_m=[0.0, 0.0, 0.0]),
             "several": SeveralObstacles,
         },
         "evaluation": {"heldout": EvaluationConfig, "peers": EvaluationConfig(protocol=Protocol.peers)},
@@ -733,6 +1027,9 @@ def register() -> None:
             "lasa_schema": LasaDataset,
             "robotasks9_schema": RoboTasks9Dataset,
             "letters_schema": LettersDataset,
+            "jc_schema": JCDataset,
+            "panda_reach_schema": PandaReachDataset,
+            "panda_pouring_schema": PandaPouringDataset,
         },
     }
     for group, nodes in choices.items():

@@ -131,6 +131,19 @@ class Interrupted(GeomotionError):
         self.exit_code = 128 + signal_number
 
 
+class TooLargeForMemory(GeomotionError):
+    """Something that would not fit into memory; said before anything is allocated."""
+
+    exit_code = 2
+
+    def __init__(self, what: str, needed_bytes: int, limit_bytes: int, fitting: str) -> None:
+        super().__init__(
+            f"{what} would need about {needed_bytes / 2**30:.3g} GiB, the limit is {limit_bytes / 2**30:.3g} GiB. "
+            f"{fitting} fits."
+        )
+        self.needed_bytes, self.limit_bytes, self.fitting = needed_bytes, limit_bytes, fitting
+
+
 def is_disk_full(error: OSError) -> bool:
     """Whether an operating-system error means that space, quota or a file-size limit ran out."""
     return error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}

@@ -7,19 +7,24 @@ import pytest
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
-from geomotion.config import GmsConfig, NcdsConfig
-from geomotion_cli.choices import group_options, top_level_names
+from geomotion_cli.choices import CONFIG_TYPES, program_options
 from geomotion_cli.dispatch import main
 
 OPTIONS = [
-    f"{group}={option}" for group, options in group_options(*top_level_names(NcdsConfig)).items() for option in options
+    (program, f"{group}={option}")
+    for program in CONFIG_TYPES
+    for group, options in program_options(program).items()
+    for option in options
 ]
+CHOICES = {choice for _, choice in OPTIONS}
 
 NEEDED = {  # what has no default
     "dataset=folder": ["dataset.root=recordings"],
     "obstacle=sphere": ["obstacle.centre_m=[0,0]", "obstacle.radius_m=1"],
     "obstacle=ellipsoid": ["obstacle.centre_m=[0,0]", "obstacle.semi_axes_m=[1,2]"],
     "obstacle=box": ["obstacle.centre_m=[0,0]", "obstacle.sides_m=[1,2]"],
+    "obstacle=mesh": ["obstacle.file=duck.obj"],
+    "obstacle=point_cloud": ["obstacle.file=scan.npy"],
     "obstacle=several": ["obstacle.bodies=[{shape:sphere,centre_m:[0,0],radius_m:1}]"],
 }
 
@@ -30,20 +35,17 @@ def configuration():
         yield
 
 
-@pytest.mark.parametrize("choice", OPTIONS)
-def test_every_choice_makes_a_typed_configuration(configuration, choice):
-    config = OmegaConf.to_object(compose("ncds", overrides=[choice, *NEEDED.get(choice, ())]))
-    assert type(config) is NcdsConfig
-
-
-@pytest.mark.parametrize("choice", [option for option in OPTIONS if option.startswith("dataset=lasa/a")])
-def test_gms_takes_the_same_recordings(configuration, choice):
-    assert type(OmegaConf.to_object(compose("gms", overrides=[choice]))) is GmsConfig
+@pytest.mark.parametrize(("program", "choice"), OPTIONS)
+def test_every_choice_makes_a_typed_configuration(configuration, program, choice):
+    config = OmegaConf.to_object(compose(program, overrides=[choice, *NEEDED.get(choice, ())]))
+    assert type(config) is CONFIG_TYPES[program]
 
 
 def test_choices_include_sub_folders_and_no_internals():
-    assert {"dataset=lasa/angle", "dataset=folder", "experiment=thesis/ncds", "field=linear"} <= set(OPTIONS)
-    assert not [option for option in OPTIONS if option.endswith("_schema")]
+    assert {"dataset=lasa/angle", "dataset=folder", "experiment=thesis/ncds", "field=linear"} <= CHOICES
+    assert ("gms", "experiment=thesis/fig_3_1") in OPTIONS
+    assert ("ncds", "experiment=thesis/fig_3_1") not in OPTIONS
+    assert not [option for option in CHOICES if option.endswith("_schema")]
 
 
 MISTAKES = {

@@ -1,13 +1,13 @@
 import pytest
 
 from geomotion.demos.columns import Column, column_names, parse, sorted_axes
-from geomotion.demos.demonstrations import CHANNEL_UNITS
+from geomotion.demos.demonstrations import CHANNEL_UNITS, UNIT_AXES
 
 
 @pytest.mark.parametrize("channel", CHANNEL_UNITS)
 @pytest.mark.parametrize("width", [1, 2, 3, 4, 12])
 def test_names_that_are_written_are_understood_when_read(channel, width):
-    width = 4 if channel == "orientation_wxyz" else width
+    width = len(UNIT_AXES.get(channel, range(width)))
     names = column_names(channel, width)
     columns = [parse(name) for name in names]
     assert len(set(names)) == width

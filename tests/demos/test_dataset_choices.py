@@ -28,6 +28,19 @@ def test_every_letter_has_a_choice_and_can_be_read(letter):
     assert demonstrations.name == f"letters/{letter}"
 
 
+@pytest.mark.parametrize("choice", ["panda/reach_to_grasp", "panda/pouring_3x3", "generated/jc"])
+def test_every_generated_motion_has_a_choice_and_can_be_read(choice):
+    demonstrations = read(dataset(choice, "dataset.demos=1", "dataset.points=10"))
+    assert (demonstrations.name, len(demonstrations[0])) == (choice, 10)
+
+
+def test_one_of_every_group_is_held_out_however_many_are_asked_for():
+    assert dataset("panda/pouring_3x3").test_demos == [15, 16, 17]
+    assert dataset("panda/pouring_3x3", "dataset.demos=9").train_demos == [0, 1, 2, 3, 4, 5]
+    assert dataset("panda/pouring_3x3", "dataset.demos=5").test_demos is None
+    assert dataset("panda/pouring_3x3", "dataset.train_demos=[0]").test_demos is None
+
+
 @pytest.mark.parametrize(("choice", "count"), [("stacked_4d", 2), ("stacked_8d", 4)])
 def test_stacked_shapes_can_be_chosen_and_changed(choice, count):
     assert len(dataset(f"lasa/{choice}").shapes) == count

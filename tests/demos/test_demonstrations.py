@@ -13,7 +13,8 @@ def line(time_s=(0.0, 1.0, 2.0), width=2, label=""):
 def broken(channel, row, value):
     trajectory = line()
     values = {"position_m": trajectory.channels["position_m"].copy()}
-    values[channel] = values.get(channel, np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)))
+    width = 3 if channel == "direction_xyz" else 4
+    values[channel] = values.get(channel, np.tile(np.eye(width)[0], (3, 1)))
     values[channel][row] = value
     return Trajectory(trajectory.time_s, values)
 
@@ -30,6 +31,9 @@ def broken(channel, row, value):
         ((broken("position_m", 1, np.nan),), r"demonstration 0, row 1: position_m is .*finite"),
         ((broken("position_m", 2, np.inf),), r"demonstration 0, row 2: position_m is .*finite"),
         ((broken("orientation_wxyz", 1, 0.1),), r"demonstration 0, row 1: quaternion of norm 0.2; expected 1"),
+        ((broken("direction_xyz", 2, 0.1),), r"demonstration 0, row 2: direction of norm 0\.173.*; expected 1"),
+        ((Trajectory(np.arange(3.0), {"direction_xyz": np.eye(3)[:, :2]}),), r"direction with 2 axes; expected 3"),
+        ((Trajectory(np.arange(3.0), {"orientation_wxyz": np.eye(3)}),), r"quaternion with 3 axes; expected 4"),
         ((Trajectory(np.arange(3.0), {"position_m": np.zeros((4, 2))}),), r"position_m has 4 rows, time has 3"),
     ],
 )

@@ -160,3 +160,58 @@ def test_resampled_quaternions_stay_unit_and_on_their_rotation(poses):
     half = result[0].time_s / 2
     np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1, atol=1e-15)
     np.testing.assert_allclose(q[:, [0, 3]], np.stack([np.cos(half), np.sin(half)], axis=1), atol=1e-8)
+
+
+def turning(q_norm=1.0, signs=None):
+    """Ten orientations that turn about z, of any length and with any signs."""
+    half = np.linspace(0, 1, 10)
+    q = np.stack([np.cos(half), np.zeros(10), np.zeros(10), np.sin(half)], axis=1)
+    return one(
+        np.arange(10), orientation_wxyz=q * np.broadcast_to(q_norm, (10,))[:, None] * (1 if signs is None else signs)
+    )
+
+
+def test_mended_quaternions_are_counted_in_one_warning(caplog):
+    lengths = np.ones(10)
+    lengths[[2, 5, 6]] = 1.004, 0.997, 1.00001
+    signs = np.array([1, 1, -1, 1, 1, 1, 1, -1, -1, -1.0])[:, None]  # three changes
+    result = preprocess(turning(lengths, signs), PreprocessConfig())
+    (record,) = caplog.records
+    assert (record.name, record.levelname) == ("geomotion", "WARNING")
+    assert record.getMessage() == "test: mended 3 quaternions that were not of unit length and 3 flips of their sign"
+    np.testing.assert_allclose(np.linalg.norm(result[0].channels["orientation_wxyz"], axis=1), 1, atol=1e-15)
+
+
+def test_quaternions_that_need_no_mending_are_met_with_silence(caplog, poses):
+    assert not any("quaternions" in step for step in preprocess(poses, PreprocessConfig()).steps)
+    single = turning(1 + 5e-8)  # as single precision has them: normalised and recorded, but nothing to worry about
+    assert "normalised quaternions" in preprocess(single, PreprocessConfig()).steps[0]
+    assert not caplog.records
+
+
+def test_a_demonstration_recorded_on_the_other_half_of_the_sphere_counts_as_one_flip(caplog, poses):
+    other = Trajectory(
+        poses[1].time_s, {**poses[1].channels, "orientation_wxyz": -poses[1].channels["orientation_wxyz"]}
+    )
+    preprocess(Demonstrations("test", (poses[0], other), "R3xS3"), PreprocessConfig())
+    assert "mended 0 quaternions that were not of unit length and 1 flips of their sign" in caplog.text
+
+
+def test_directions_become_unit_and_keep_their_signs(caplog):
+    angle = np.linspace(0, np.pi, 12)
+    d = np.stack([np.cos(angle), np.sin(angle), np.zeros(12)], axis=1)
+    d[6:] *= -1  # a jump to the other side is a fact, not a convention
+    result = preprocess(one(np.arange(12), direction_xyz=1.004 * d), PreprocessConfig())
+    np.testing.assert_allclose(result[0].channels["direction_xyz"], d, atol=1e-15)
+    assert result.steps == ("normalised directions",)
+    assert "mended 12 directions that were not of unit length" in caplog.text
+
+
+def test_resampled_directions_stay_on_the_sphere():
+    angle = np.linspace(0, 2, 40)
+    d = np.stack([np.cos(angle), np.sin(angle), np.zeros(40)], axis=1)
+    result = preprocess(one(np.linspace(0, 2, 40), direction_xyz=d), PreprocessConfig(resample_points=77))
+    expected = np.linspace(0, 2, 77)
+    found = result[0].channels["direction_xyz"]
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-15)
+    np.testing.assert_allclose(found[:, 0], np.cos(expected), atol=1e-6)

@@ -4,16 +4,16 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from geomotion.demos.demonstrations import Array
+from geomotion.demos.demonstrations import UNIT_AXES, Array
 
 METRES_PER = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 TIME_COLUMNS = ("time_s", "timestamp")
 DEMO_COLUMNS = ("demo", "episode", "episode_index")
 BOOKKEEPING_COLUMNS = ("frame_index", "index", "task_index")  # of LeRobot datasets
-QUATERNION_AXES = ("w", "x", "y", "z")
 ALL_COLUMNS = (
     *TIME_COLUMNS, *DEMO_COLUMNS, "x", "y", "z", "x_mm", "y_mm", "z_mm", "position_m_x", "position_m_y", "position_m_z",
-    "orientation_w", "orientation_x", "orientation_y", "orientation_z", "joint_1_rad", "joint_1_rad_per_s",
+    "orientation_w", "orientation_x", "orientation_y", "orientation_z", "direction_x", "direction_y", "direction_z",
+    "joint_1_rad", "joint_1_rad_per_s",
     "velocity_m_per_s_x", "velocity_m_per_s_y", "velocity_m_per_s_z",
 )  # fmt: skip
 
@@ -22,6 +22,7 @@ _PATTERNS = (
     ("position_m", re.compile(r"(?P<axis>[xyz])(?:_(?P<unit>m|cm|mm))?")),
     ("velocity_m_per_s", re.compile(r"velocity_(?P<unit>m|cm|mm)_per_s_(?P<axis>[xyz]|\d+)")),
     ("orientation_wxyz", re.compile(r"orientation_(?P<axis>[wxyz])")),
+    ("direction_xyz", re.compile(r"direction_(?P<axis>[xyz])")),
     ("joint_velocity_rad_per_s", re.compile(r"joint_(?P<axis>.+)_rad_per_s")),
     ("joints_rad", re.compile(r"joint_(?P<axis>.+)_rad")),
 )
@@ -53,8 +54,8 @@ def parse(name: str) -> Column | None:
 
 def column_names(channel: str, width: int) -> list[str]:
     """The schema's names for the axes of a channel of `width` axes."""
-    if channel == "orientation_wxyz":
-        return [f"orientation_{axis}" for axis in QUATERNION_AXES]
+    if channel in UNIT_AXES:
+        return [f"{channel.partition('_')[0]}_{axis}" for axis in UNIT_AXES[channel]]
     if channel == "joints_rad":
         return [f"joint_{number}_rad" for number in range(1, width + 1)]
     if channel == "joint_velocity_rad_per_s":
@@ -70,6 +71,8 @@ def space_of(channels: dict[str, Array]) -> str:
         factors.append(f"R{channels['position_m'].shape[1]}")
     if "orientation_wxyz" in channels:
         factors.append("S3")
+    if "direction_xyz" in channels:
+        factors.append("S2")
     if "joints_rad" in channels:
         factors.append("joint")
     return "x".join(factors)
@@ -78,7 +81,7 @@ def space_of(channels: dict[str, Array]) -> str:
 def sorted_axes(axes: Iterable[str]) -> list[str]:
     """Axes in the order of the channel: w, x, y, z; numbers by value; joints as they stand in the file."""
     axes = list(axes)
-    if all(axis in QUATERNION_AXES for axis in axes):
+    if all(axis in UNIT_AXES["orientation_wxyz"] for axis in axes):
         return sorted(axes)
     if all(axis.isdigit() for axis in axes):
         return sorted(axes, key=int)

@@ -14,11 +14,13 @@ Array = NDArray[np.float64]
 CHANNEL_UNITS = {
     "position_m": "m",
     "orientation_wxyz": "1",
+    "direction_xyz": "1",
     "joints_rad": "rad",
     "velocity_m_per_s": "m/s",
     "joint_velocity_rad_per_s": "rad/s",
 }
-UNIT_NORM_TOLERANCE = 1e-2  # quaternions printed with three digits still pass
+UNIT_AXES = {"orientation_wxyz": ("w", "x", "y", "z"), "direction_xyz": ("x", "y", "z")}  # channels on S³ and on S²
+UNIT_NORM_TOLERANCE = 1e-2  # those printed with three digits still pass
 VELOCITY_OF = {"position_m": "velocity_m_per_s", "joints_rad": "joint_velocity_rad_per_s"}
 
 
@@ -29,7 +31,7 @@ class Trajectory:
     Attributes:
         time_s: Increasing time stamps [s], shape (time,).
         channels: Name → values, each of shape (time, axes); the unit is part of the name
-            (:data:`CHANNEL_UNITS`). Quaternions are scalar-first.
+            (:data:`CHANNEL_UNITS`). Quaternions are scalar-first; they and directions have unit length.
         label: Name of the demonstration or its condition.
     """
 
@@ -113,6 +115,13 @@ class Demonstrations:
             "channels": {name: values.shape[1] for name, values in self.trajectories[0].channels.items()},
         }
 
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Group of each demonstration: its label, where labels name groups; one for all, where each stands alone."""
+        labels = [trajectory.label for trajectory in self.trajectories]
+        are_groups = len(set(labels)) < len(labels)
+        return tuple(labels) if are_groups else ("",) * len(labels)
+
     def select(self, indices: Sequence[int]) -> "Demonstrations":
         """The demonstrations with these numbers.
 
@@ -154,15 +163,18 @@ def validate(name: str, trajectories: Sequence[Trajectory]) -> None:
                 raise DatasetError(
                     name, f"{place}, row {bad[0]}: {channel} is {values[bad[0]].tolist()}; expected finite numbers"
                 )
-            if channel == "orientation_wxyz":
-                _validate_quaternions(name, place, values)
+            if channel in UNIT_AXES:
+                _validate_unit(name, place, values, channel)
 
 
-def _validate_quaternions(name: str, place: str, q: Array) -> None:
-    norms = np.linalg.norm(q, axis=1)
+def _validate_unit(name: str, place: str, values: Array, channel: str) -> None:
+    what, width = "quaternion" if channel == "orientation_wxyz" else "direction", len(UNIT_AXES[channel])
+    if values.shape[1] != width:
+        raise DatasetError(name, f"{place}: {what} with {values.shape[1]} axes; expected {width}")
+    norms = np.linalg.norm(values, axis=1)
     bad = np.flatnonzero(np.abs(norms - 1) > UNIT_NORM_TOLERANCE)
     if bad.size:
-        raise DatasetError(name, f"{place}, row {bad[0]}: quaternion of norm {norms[bad[0]]:g}; expected 1")
+        raise DatasetError(name, f"{place}, row {bad[0]}: {what} of norm {norms[bad[0]]:g}; expected 1")
 
 
 def _validate_time(name: str, place: str, time_s: Array) -> None:

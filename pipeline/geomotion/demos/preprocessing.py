@@ -1,22 +1,27 @@
 """Preprocessing as explicit steps in a fixed order; every step that changes something is recorded with the data.
 
-Order: trim, clocks from zero, quaternions, resample, smooth, align end points, scale, velocities.
+Order: trim, clocks from zero, quaternions and directions, resample, smooth, align end points, scale, velocities.
 """
 
+import logging
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from geomotion.config import PreprocessConfig, VelocitySource
-from geomotion.demos.demonstrations import VELOCITY_OF, Array, Demonstrations, Trajectory
+from geomotion.demos.demonstrations import UNIT_AXES, VELOCITY_OF, Array, Demonstrations, Trajectory
 from geomotion.errors import InvalidSetting
 
 QUATERNION = "orientation_wxyz"
+DIRECTION = "direction_xyz"
 LENGTHS = ("position_m", "velocity_m_per_s")
 EVEN_STEPS_TOLERANCE = 1e-3  # relative
 ROUNDING = 1e-12
+SINGLE_PRECISION = 1e-6
 SMOOTHING_ORDER = 3
+
+_log = logging.getLogger("geomotion")
 
 
 def preprocess(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
@@ -32,6 +37,7 @@ def preprocess(demonstrations: Demonstrations, config: PreprocessConfig) -> Demo
     demonstrations = _trim(demonstrations, config)
     demonstrations = _start_clocks_at_zero(demonstrations)
     demonstrations = _tidy_quaternions(demonstrations)
+    demonstrations = _tidy_directions(demonstrations)
     demonstrations = _resample(demonstrations, config)
     demonstrations = _smooth(demonstrations, config)
     demonstrations = _align_ends(demonstrations, config)
@@ -75,31 +81,57 @@ def _start_clocks_at_zero(demonstrations: Demonstrations) -> Demonstrations:
 
 
 def _tidy_quaternions(demonstrations: Demonstrations) -> Demonstrations:
-    """Give quaternions unit length, and choose between q and -q.
+    """Give quaternions unit length, and choose between q and -q; say how many needed it.
 
     The sign is the one nearer to the previous sample, at the start the one nearer to the first demonstration.
     """
     if QUATERNION not in demonstrations.channel_names:
         return demonstrations
     reference = demonstrations[0].channels[QUATERNION][0]
-
-    def tidy(trajectory: Trajectory) -> Trajectory:
-        q = trajectory.channels[QUATERNION]
-        turns = np.einsum("ti,ti->t", q, np.concatenate([reference[None], q[:-1]]))
-        signs = np.cumprod(np.where(turns < 0, -1.0, 1.0))
-        return replace(
-            trajectory, channels=_normalise_quaternions({**trajectory.channels, QUATERNION: q * signs[:, None]})
-        )
-
-    tidied = [tidy(trajectory) for trajectory in demonstrations.trajectories]
-    pairs = zip(demonstrations.trajectories, tidied, strict=True)
-    if all(
-        np.allclose(old.channels[QUATERNION], new.channels[QUATERNION], rtol=0, atol=ROUNDING) for old, new in pairs
-    ):
+    turns = [
+        np.einsum("ti,ti->t", q, np.concatenate([reference[None], q[:-1]]))
+        for q in (trajectory.channels[QUATERNION] for trajectory in demonstrations.trajectories)
+    ]
+    flips = sum(int((turn < 0).sum()) for turn in turns)
+    odd_lengths, is_rounded = _odd_lengths(demonstrations, QUATERNION)
+    if not flips and is_rounded:
         return demonstrations
+    if flips or odd_lengths:
+        message = "%s: mended %d quaternions that were not of unit length and %d flips of their sign"
+        _log.warning(message, demonstrations.name, odd_lengths, flips)
+
+    def tidy(trajectory: Trajectory, turn: Array) -> Trajectory:
+        signs = np.cumprod(np.where(turn < 0, -1.0, 1.0))
+        q = trajectory.channels[QUATERNION] * signs[:, None]
+        return replace(trajectory, channels=_normalise({**trajectory.channels, QUATERNION: q}))
+
+    tidied = [tidy(*pair) for pair in zip(demonstrations.trajectories, turns, strict=True)]
     return demonstrations.with_step(
         tidied, "normalised quaternions, with signs continuous and alike across demonstrations"
     )
+
+
+def _tidy_directions(demonstrations: Demonstrations) -> Demonstrations:
+    """Give directions unit length, and say how many needed it; unlike q and -q, d and -d are different."""
+    if DIRECTION not in demonstrations.channel_names:
+        return demonstrations
+    odd_lengths, is_rounded = _odd_lengths(demonstrations, DIRECTION)
+    if is_rounded:
+        return demonstrations
+    if odd_lengths:
+        _log.warning("%s: mended %d directions that were not of unit length", demonstrations.name, odd_lengths)
+    return _map(
+        demonstrations,
+        lambda trajectory: replace(trajectory, channels=_normalise(dict(trajectory.channels))),
+        "normalised directions",
+    )
+
+
+def _odd_lengths(demonstrations: Demonstrations, channel: str) -> tuple[int, bool]:
+    """How many samples are off unit length by more than single precision is, and whether all are within rounding."""
+    samples = np.concatenate([trajectory.channels[channel] for trajectory in demonstrations.trajectories])
+    off = np.abs(np.linalg.norm(samples, axis=1) - 1)
+    return int((off > SINGLE_PRECISION).sum()), bool((off <= ROUNDING).all())
 
 
 def _resample(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:
@@ -112,7 +144,7 @@ def _resample(demonstrations: Demonstrations, config: PreprocessConfig) -> Demon
         time_s = np.linspace(trajectory.time_s[0], trajectory.time_s[-1], points)
         recorded = _without_velocities(trajectory)
         channels = {name: CubicSpline(trajectory.time_s, values)(time_s) for name, values in recorded.items()}
-        return replace(trajectory, time_s=time_s, channels=_normalise_quaternions(channels))
+        return replace(trajectory, time_s=time_s, channels=_normalise(channels))
 
     return _map(demonstrations, resample, f"resampled to {points} points, even in time (cubic spline)")
 
@@ -126,7 +158,7 @@ def _smooth(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonst
         points = _window_points(trajectory, config.smooth_window_s)
         recorded = _without_velocities(trajectory)
         channels = {name: savgol_filter(values, points, SMOOTHING_ORDER, axis=0) for name, values in recorded.items()}
-        return replace(trajectory, channels=_normalise_quaternions(channels))
+        return replace(trajectory, channels=_normalise(channels))
 
     step = f"smoothed over {config.smooth_window_s:g} s (Savitzky-Golay, order {SMOOTHING_ORDER})"
     return _map(demonstrations, smooth, step)
@@ -216,9 +248,7 @@ def _without_velocities(trajectory: Trajectory) -> dict[str, Array]:
     return {name: values for name, values in trajectory.channels.items() if name not in VELOCITY_OF.values()}
 
 
-def _normalise_quaternions(channels: dict[str, Array]) -> dict[str, Array]:
-    """Bring interpolated or averaged quaternions back to unit length."""
-    if QUATERNION not in channels:
-        return channels
-    q = channels[QUATERNION]
-    return {**channels, QUATERNION: q / np.linalg.norm(q, axis=1, keepdims=True)}
+def _normalise(channels: dict[str, Array]) -> dict[str, Array]:
+    """Bring interpolated or averaged quaternions and directions back to unit length."""
+    units = {name: values for name, values in channels.items() if name in UNIT_AXES}
+    return channels | {name: values / np.linalg.norm(values, axis=1, keepdims=True) for name, values in units.items()}

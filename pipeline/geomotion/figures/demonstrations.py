@@ -1,6 +1,6 @@
-"""Pictures of recordings: paths in a plane, projections of paths in space, coordinates over time."""
+"""Pictures of recordings: paths in a plane, projections of paths in space, directions on the sphere, all over time."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,31 +11,48 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from geomotion.demos.columns import column_names
-from geomotion.demos.demonstrations import CHANNEL_UNITS, VELOCITY_OF, Demonstrations
-from geomotion.figures.style import COLOUR, new_figure, paper_style, state_label
+from geomotion.demos.demonstrations import CHANNEL_UNITS, VELOCITY_OF, Demonstrations, Trajectory
+from geomotion.figures.style import COLOUR, SEQUENCE, new_figure, paper_style, state_label
 
 COLUMNS = 4
 LEGEND_MM, PATHS_MM, ROW_MM = 12.0, 58.0, 34.0
 PROJECTIONS = ((0, 1), (0, 2), (1, 2))
+PARALLELS_DEG, MERIDIANS_DEG = (30, 60, 90), (0, 45, 90, 135)
+GROUP_COLOURS = tuple(SEQUENCE[number] for number in (0, 1, 4, 5, 2, 3))  # most different ones first
 START: dict[str, Any] = {"marker": "o", "color": COLOUR["rollout"], "mec": "black", "mew": 0.5, "markersize": 4}
 END: dict[str, Any] = {"marker": "*", "color": "white", "mec": "black", "mew": 0.7, "markersize": 9}
+
+
+def group_colours(demonstrations: Demonstrations) -> dict[str, str]:
+    """A colour for every label, where labels name groups; empty where they do not, or where there are too many."""
+    labels = [trajectory.label for trajectory in demonstrations.trajectories]
+    groups = list(dict.fromkeys(labels))
+    are_groups = 1 < len(groups) < len(labels) and len(groups) <= len(GROUP_COLOURS)
+    return dict(zip(groups, GROUP_COLOURS, strict=False)) if are_groups else {}
 
 
 def draw_paths(
     ax: Axes, demonstrations: Demonstrations, plane: tuple[int, int] = (0, 1), held_out: Collection[int] = ()
 ) -> Axes:
     """Draw positions projected to a plane: start as circle, end as star, held-out demonstrations dotted."""
-    for number, trajectory in enumerate(demonstrations.trajectories):
-        path = trajectory.channels["position_m"][:, plane]
-        style = ":" if number in held_out else "-"
-        ax.plot(*path.T, color=COLOUR["demonstration"], linestyle=style, linewidth=0.9, zorder=2)
-        ax.plot(*path[0], **START, zorder=3)
-        ax.plot(*path[-1], **END, zorder=4)
-    names = [_axis_label("position_m", axis, demonstrations) for axis in plane]
-    ax.set(xlabel=names[0], ylabel=names[1])
+    _draw_curves(ax, demonstrations, "position_m", plane, held_out)
     ax.set_aspect("equal", adjustable="datalim")
     for direction in (ax.xaxis, ax.yaxis):
         direction.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
+    return ax
+
+
+def draw_directions(ax: Axes, demonstrations: Demonstrations, held_out: Collection[int] = ()) -> Axes:
+    """Draw directions on the unit sphere, seen from its pole (the z axis) and from far away."""
+    thin: dict[str, Any] = {"color": COLOUR["field"], "linewidth": 0.4, "zorder": 1}
+    around = np.linspace(0, 2 * np.pi, 200)
+    for colatitude in np.radians(PARALLELS_DEG):
+        ax.plot(np.sin(colatitude) * np.cos(around), np.sin(colatitude) * np.sin(around), **thin)
+    for longitude in np.radians(MERIDIANS_DEG):
+        ends = np.array([-1.0, 1.0])
+        ax.plot(np.cos(longitude) * ends, np.sin(longitude) * ends, **thin)
+    _draw_curves(ax, demonstrations, "direction_xyz", (0, 1), held_out)
+    ax.set(aspect="equal", xticks=(-1, 0, 1), yticks=(-1, 0, 1))
     return ax
 
 
@@ -43,10 +60,9 @@ def draw_axis(
     ax: Axes, demonstrations: Demonstrations, channel: str, axis: int, held_out: Collection[int] = ()
 ) -> Axes:
     """Draw one axis of a channel over time, held-out demonstrations dotted."""
-    for number, trajectory in enumerate(demonstrations.trajectories):
-        style = ":" if number in held_out else "-"
+    for trajectory, colour, style in _looks(demonstrations, held_out):
         values = trajectory.channels[channel][:, axis]
-        ax.plot(trajectory.time_s, values, color=COLOUR["demonstration"], linestyle=style, linewidth=0.7)
+        ax.plot(trajectory.time_s, values, color=colour, linestyle=style, linewidth=0.7)
     ax.set(ylabel=_axis_label(channel, axis, demonstrations))
     ax.margins(x=0.01)
     return ax
@@ -56,7 +72,9 @@ def draw_axis(
 def figure_demonstrations(
     demonstrations: Demonstrations, channels: Sequence[str] | None = None, held_out: Collection[int] = ()
 ) -> Figure:
-    """Paths for planar positions; otherwise every axis over time, with projections of positions in space.
+    """Paths for planar positions; otherwise every axis over time, below projections of positions and directions.
+
+    Demonstrations whose labels name groups are drawn in one colour a group.
 
     Args:
         demonstrations: What to draw.
@@ -72,7 +90,8 @@ def figure_demonstrations(
     else:
         figure = _small_multiples(demonstrations, widths, held_out)
     has_held_out = any(number in held_out for number in range(len(demonstrations)))
-    _legend(figure, has_held_out, has_paths=widths.get("position_m") in (2, 3))
+    has_paths = widths.get("position_m") in (2, 3) or "direction_xyz" in widths
+    _legend(figure, group_colours(demonstrations), has_held_out, has_paths)
     return figure
 
 
@@ -85,25 +104,68 @@ def figure_data(demonstrations: Demonstrations) -> dict[str, NDArray[np.float64]
     return arrays
 
 
+def _looks(demonstrations: Demonstrations, held_out: Collection[int]) -> Iterator[tuple[Trajectory, str, str]]:
+    """Every demonstration with its colour and line style."""
+    colours = group_colours(demonstrations)
+    for number, trajectory in enumerate(demonstrations.trajectories):
+        yield trajectory, colours.get(trajectory.label, COLOUR["demonstration"]), ":" if number in held_out else "-"
+
+
+def _draw_curves(
+    ax: Axes, demonstrations: Demonstrations, channel: str, plane: tuple[int, int], held_out: Collection[int]
+) -> None:
+    """Curves of two axes of a channel with their ends."""
+    has_groups = bool(group_colours(demonstrations))
+    for trajectory, colour, style in _looks(demonstrations, held_out):
+        path = trajectory.channels[channel][:, plane]
+        start = START | {"color": colour} if has_groups else START
+        ax.plot(*path.T, color=colour, linestyle=style, linewidth=0.9, zorder=2)
+        ax.plot(*path[0], **start, zorder=3)
+        ax.plot(*path[-1], **END, zorder=4)
+    names = [_axis_label(channel, axis, demonstrations) for axis in plane]
+    ax.set(xlabel=names[0], ylabel=names[1])
+
+
 def _small_multiples(demonstrations: Demonstrations, widths: Mapping[str, int], held_out: Collection[int]) -> Figure:
-    """Every axis over time; above it, where positions are planar or spatial, the paths."""
+    """Every axis over time, channels in rows of their own; above them paths in the plane, in space, on the sphere."""
     planes = {2: PROJECTIONS[:1], 3: PROJECTIONS}.get(widths.get("position_m", 0), ())
-    axes = [(channel, axis) for channel, width in widths.items() for axis in range(width)]
-    rows = -(-len(axes) // COLUMNS)
-    heights = [PATHS_MM] * bool(planes) + [ROW_MM * rows]
+    views = len(planes) + ("direction_xyz" in widths)
+    cells = _cells(widths)
+    heights = [PATHS_MM] * bool(views) + [ROW_MM * len(cells)]
     figure = new_figure(width_mm=175, height_mm=LEGEND_MM + sum(heights))
     *above, below = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
     for part in above:
-        for ax, plane in zip(part.subplots(1, len(planes), squeeze=False)[0], planes, strict=True):
+        axes = part.subplots(1, views, squeeze=False)[0]
+        for ax, plane in zip(axes, planes, strict=False):
             draw_paths(ax, demonstrations, plane, held_out)
-    cells = below.subplots(rows, min(COLUMNS, len(axes)), squeeze=False).flatten()
-    for cell, (channel, axis) in zip(cells, axes, strict=False):
-        draw_axis(cell, demonstrations, channel, axis, held_out)
-    for cell in cells[max(0, len(axes) - COLUMNS) : len(axes)]:
-        cell.set_xlabel("time [s]")
-    for cell in cells[len(axes) :]:
-        cell.set_axis_off()
+        if "direction_xyz" in widths:
+            draw_directions(axes[-1], demonstrations, held_out)
+    grid = below.subplots(*cells.shape, squeeze=False)
+    for (row, column), cell in np.ndenumerate(cells):
+        ax = grid[row, column]
+        if cell is None:
+            ax.set_axis_off()
+            continue
+        channel, axis = cell
+        draw_axis(ax, demonstrations, channel, axis, held_out)
+        if row + 1 == len(cells) or cells[row + 1, column] is None:
+            ax.set_xlabel("time [s]")
     return figure
+
+
+def _cells(widths: Mapping[str, int]) -> NDArray[np.object_]:
+    """Channel and axis of every panel over time, None where there is none, shape (row, column)."""
+    columns = min(COLUMNS, max(widths.values()))
+    rows: list[list[tuple[str, int] | None]] = []
+    for channel, width in widths.items():
+        for first in range(0, width, columns):
+            axes = range(first, min(first + columns, width))
+            rows.append([*((channel, axis) for axis in axes), *[None] * (columns - len(axes))])
+    cells = np.empty((len(rows), columns), dtype=object)
+    for row, panels in enumerate(rows):
+        for column, panel in enumerate(panels):
+            cells[row, column] = panel
+    return cells
 
 
 def _axis_label(channel: str, axis: int, demonstrations: Demonstrations) -> str:
@@ -111,16 +173,19 @@ def _axis_label(channel: str, axis: int, demonstrations: Demonstrations) -> str:
     if channel == "position_m" and width > 3:
         return state_label(axis)
     name = column_names(channel, width)[axis]
-    short = {"position_m": "", "orientation_wxyz": "q", "joints_rad": "joint "}.get(channel, "")
+    short = {"position_m": "", "orientation_wxyz": "q", "joints_rad": "joint ", "direction_xyz": "direction "}.get(
+        channel, ""
+    )
     return f"{short}{name.removesuffix('_rad').rsplit('_', 1)[-1]} [{CHANNEL_UNITS[channel]}]"
 
 
-def _legend(figure: Figure, has_held_out: bool, has_paths: bool) -> None:
+def _legend(figure: Figure, groups: Mapping[str, str], has_held_out: bool, has_paths: bool) -> None:
     black = COLOUR["demonstration"]
-    handles = [Line2D([], [], color=black, label="demonstration")]
+    lines = groups or {"demonstration": black}
+    handles = [Line2D([], [], color=colour, label=name) for name, colour in lines.items()]
     if has_held_out:
         handles.append(Line2D([], [], color=black, linestyle=":", label="held out"))
     if has_paths:
-        markers = (("start", START), ("end", END))
-        handles += [Line2D([], [], **marker, linestyle="", label=name) for name, marker in markers]
-    figure.legend(handles=handles, loc="outside upper center", ncols=4)
+        start = START | {"color": "white"} if groups else START
+        handles += [Line2D([], [], **look, linestyle="", label=name) for name, look in (("start", start), ("end", END))]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))

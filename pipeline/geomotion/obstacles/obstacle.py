@@ -5,30 +5,18 @@ from typing import Protocol, runtime_checkable
 
 import torch
 
+from geomotion.obstacles.body import Body
 from geomotion.types import Float, State, Tensor, Times
 
 BISECTIONS = 60  # halves an interval until neighbouring double-precision numbers
 
 
 @runtime_checkable
-class Obstacle(Protocol):
+class Obstacle(Body, Protocol):
     """A solid body that every ray from its reference point leaves exactly once (star-shaped).
 
-    Attributes:
-        dim: D.
-        reference: Point inside it at time zero, shape (D,) [m].
-        inradius: Radius of a ball around the reference point that it contains [m].
-        velocity: Its constant velocity, shape (D,) [m/s].
+    Its signed distance is exact and differentiable outside.
     """
-
-    dim: int
-    reference: Tensor
-    inradius: float
-    velocity: Tensor
-
-    def signed_distance(self, x: State) -> Float[Tensor, "*batch"]:
-        """Distance to the surface [m], negative inside; differentiable outside."""
-        ...
 
     def level(self, x: State) -> Float[Tensor, "*batch"]:
         """Γ(x): one at the surface, growing along every ray from the reference point, C¹ outside.
@@ -61,7 +49,7 @@ def surface_points(obstacle: Obstacle, directions: Float[Tensor, "*batch D"]) ->
 
 
 def clearance(
-    obstacles: Sequence[Obstacle], states: Float[Tensor, "*batch time D"], times: Times
+    obstacles: Sequence[Body], states: Float[Tensor, "*batch time D"], times: Times
 ) -> Float[Tensor, "*batch"]:
     """Smallest signed distance between a trajectory and the obstacles, which move meanwhile [m].
 

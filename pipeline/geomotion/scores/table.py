@@ -14,6 +14,8 @@ TITLES = {
     "nearby.euclidean": "Rollouts from nearby starts, Euclidean distance",
     "nearby.claimed": "Rollouts from nearby starts, distance in the claimed metric",
     "goal": "Starts on a grid",
+    "pairs": "From every group's start to every group's goal",
+    "methods": "The same geodesic by other methods",
 }
 
 

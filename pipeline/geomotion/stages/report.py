@@ -1,6 +1,6 @@
 """Write the report of a run: one HTML page made of what the other stages left."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +9,13 @@ from omegaconf import OmegaConf
 
 from geomotion.errors import CorruptArtefact
 from geomotion.figures.arrays import EvaluationArrays, read_evaluation
-from geomotion.figures.report.caveats import caveats
-from geomotion.figures.report.page import Page, render
-from geomotion.figures.report.pictures import missing, pictures
-from geomotion.figures.report.scores import headlines, tables
-from geomotion.figures.report.verdict import verdict
+from geomotion.figures.report.ncds_caveats import caveats
+from geomotion.figures.report.ncds_pictures import CAPTIONS, missing
+from geomotion.figures.report.ncds_scores import FIELD, headlines
+from geomotion.figures.report.ncds_verdict import verdict
+from geomotion.figures.report.page import Column, Data, Listing, Origin, Page, render
+from geomotion.figures.report.pictures import pictures
+from geomotion.figures.report.scores import tables
 from geomotion.files import read_json, write_text
 from geomotion.tracking import Artefacts, StageRun
 
@@ -54,35 +56,47 @@ def compose(config: ReportConfig, inputs: Mapping[str, Artefacts]) -> Page:
     summary: Document = read_json(inputs["ingest"].path("summary.json"))
     certificate: Document = read_json(inputs["evaluate"].path("certificate.json"))
     judged: Document = read_json(inputs["evaluate"].path("scores.json"))
-    rollouts: Document = read_json(inputs["rollout"].path("rollouts.json")) if "rollout" in inputs else {}
     data = read_evaluation(inputs["evaluate"].path("evaluation.npz"))
-    present = {name: inputs[name] for name in STAGES if name in inputs}
-    configurations = {name: _recorded(stage, "config.json") for name, stage in present.items()}
-    shown = pictures(tuple(inputs[name].folder / "figures" for name in ("ingest", "train", "evaluate")))
-    facts = (
-        _facts(summary, data, judged, configurations["train"])
-        | _training_facts(inputs["train"])
-        | _policy_facts(inputs)
-    )
+    shown = pictures([inputs[name].folder / "figures" for name in ("ingest", "train", "evaluate")], CAPTIONS)
+    training = recorded(inputs["train"], "config.json")
+    facts = _facts(summary, data, judged, training) | training_facts(inputs["train"]) | _policy_facts(inputs)
     return Page(
         title=config.title or f"Motion learned from {judged['dataset']}",
-        facts=facts,
         verdict=verdict(certificate, data.eigenvalues),
         headlines=headlines(judged["scores"]),
-        tables=tables(judged["scores"]),
+        facts=facts,
         pictures=shown,
-        demonstrations=list(summary.get("demos", [])),
-        rollouts=list(rollouts.get("rollouts", [])),
-        steps=list(summary.get("steps", [])),
-        source=summary.get("source") or "not stated",
-        licence=summary.get("licence") or "not stated",
+        tables=tables(judged["scores"], FIELD),
+        data=Data.of(summary),
+        origin=origin(config.command, inputs, STAGES),
         caveats=caveats(data, str(certificate.get("claim")), str(judged["protocol"])),
         omitted=missing(shown, data) | _omitted(judged, inputs),
-        command=config.command,
+        listings=_rollouts(inputs),
+    )
+
+
+def origin(command: str, inputs: Mapping[str, Artefacts], stages: Sequence[str]) -> Origin:
+    """What the tracker recorded about the stages before.
+
+    Args:
+        command: Command line that repeats the run; empty if it is not known.
+        inputs: Stages, among them ``evaluate``.
+        stages: Their order on the page.
+    """
+    present = {name: inputs[name] for name in stages if name in inputs}
+    configurations = {name: recorded(stage, "config.json") for name, stage in present.items()}
+    return Origin(
+        command,
         configurations={name: _yaml(found) for name, found in configurations.items() if found},
-        versions=_recorded(inputs["evaluate"], "environment.json"),
+        versions=recorded(inputs["evaluate"], "environment.json"),
         runs={name: (stage.run_id, stage.digest) for name, stage in present.items()},
     )
+
+
+def recorded(stage: Artefacts, name: str) -> dict[str, Any]:
+    """What the tracker recorded beside the outputs of a stage; empty where it did not."""
+    path = stage.folder / name
+    return dict(read_json(path)) if path.is_file() else {}
 
 
 def _facts(summary: Document, data: EvaluationArrays, judged: Document, training: Document) -> dict[str, str]:
@@ -102,7 +116,12 @@ def _facts(summary: Document, data: EvaluationArrays, judged: Document, training
     }
 
 
-def _training_facts(train: Artefacts) -> dict[str, str]:
+def training_facts(train: Artefacts) -> dict[str, str]:
+    """How long was trained, and how far the loss fell.
+
+    Raises:
+        CorruptArtefact: If ``training.csv`` is no such table.
+    """
     path = train.path("training.csv")
     try:
         last = pd.read_csv(path).iloc[-1]
@@ -119,10 +138,22 @@ def _policy_facts(inputs: Mapping[str, Artefacts]) -> dict[str, str]:
     return {"Exported policy": f"ONNX, {policy['query_time_ms']:.2g} ms for one velocity, {differs}"}
 
 
-def _recorded(stage: Artefacts, name: str) -> dict[str, Any]:
-    """What the tracker recorded beside the outputs of a stage; empty where it did not."""
-    path = stage.folder / name
-    return dict(read_json(path)) if path.is_file() else {}
+def _rollouts(inputs: Mapping[str, Artefacts]) -> tuple[Listing, ...]:
+    if "rollout" not in inputs:
+        return ()
+    rollouts: list[Document] = read_json(inputs["rollout"].path("rollouts.json")).get("rollouts", [])
+    names = ("start", "duration [s]", "points", "to the goal at the end [mm]")
+    rows = tuple(
+        (str(row["start"]), f"{row['duration_s']:.2f}", str(row["points"]), _to_goal(row), str(row["outcome"]))
+        for row in rollouts
+    )
+    columns = (*(Column(name) for name in names), Column("outcome", is_text=True))
+    return (Listing("Rollouts", columns, rows),) if rows else ()
+
+
+def _to_goal(row: Document) -> str:
+    distance_m = row["distance_to_goal_m"]
+    return "infinite" if distance_m is None else f"{1000 * distance_m:.2f}"
 
 
 def _yaml(configuration: Document) -> str:

@@ -1,5 +1,9 @@
 """Obstacles from configuration, and the field that flows around them."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import torch
 from scipy.spatial.transform import Rotation
@@ -7,10 +11,15 @@ from scipy.spatial.transform import Rotation
 from geomotion import config as schema
 from geomotion.errors import InvalidSetting
 from geomotion.models import Skill
+from geomotion.obstacles.body import Body
 from geomotion.obstacles.modulation import ModulatedField
+from geomotion.obstacles.motion import ConstantVelocity, Motion, MovingBody, Waypoints
 from geomotion.obstacles.obstacle import Obstacle
 from geomotion.obstacles.solids import Box, Ellipsoid, Sphere
+from geomotion.obstacles_files import Placement, load_mesh, load_point_cloud
 from geomotion.types import Float, Tensor
+
+SHARP = 0.01  # rounding of edges, of the shortest side
 
 
 def modulated(config: schema.ObstacleConfig, skill: Skill) -> ModulatedField | None:
@@ -19,21 +28,73 @@ def modulated(config: schema.ObstacleConfig, skill: Skill) -> ModulatedField | N
     Raises:
         InvalidSetting: If an obstacle does not fit the state, or one at rest covers the goal.
     """
-    match config:
-        case schema.SeveralObstacles():
-            bodies: list[schema.SolidObstacle] = config.bodies
-        case schema.SolidObstacle():
-            bodies = [config]
-        case _:
-            return None
-    obstacles = [build_obstacle(body, skill.goal) for body in bodies]
+    bodies = solids(config)
+    if not isinstance(config, schema.Avoidance) or not bodies:
+        return None
+    for body in bodies:
+        if isinstance(body, schema.MeshObstacle | schema.PointCloudObstacle) or body.path_m is not None:
+            raise InvalidSetting(
+                "obstacle", _kind(body), "a sphere, ellipsoid or box with constant velocity: fields go around those"
+            )
+    obstacles = [obstacle for body in bodies if isinstance(obstacle := build_obstacle(body, skill.goal), Obstacle)]
     for body, obstacle in zip(bodies, obstacles, strict=True):
         if float(obstacle.level(skill.goal)) < 1 and not bool(obstacle.velocity.any()):
             raise InvalidSetting("obstacle.centre_m", body.centre_m, "an obstacle that leaves the goal free")
     return ModulatedField(skill.field, obstacles, config.reactivity, config.escape, config.recovery_time_s)
 
 
-def build_obstacle(config: schema.SolidObstacle, like: Float[Tensor, " D"]) -> Obstacle:
+def solids(config: schema.ObstacleConfig) -> list[schema.SolidObstacle]:
+    """The bodies of a configuration; none in free space."""
+    match config:
+        case schema.SeveralObstacles():
+            return list(config.bodies)
+        case schema.SolidObstacle():
+            return [config]
+        case _:
+            return []
+
+
+def moving_bodies(config: schema.ObstacleConfig, dim: int) -> list[MovingBody]:
+    """Obstacles with names and motions, for planning in a space of `dim` axes.
+
+    Raises:
+        InvalidSetting: If a number of coordinates does not fit, or a mesh is asked for in a plane.
+        MissingData: If a file does not exist.
+        DatasetError: If a file holds no usable mesh or points.
+    """
+    like = torch.zeros(dim, dtype=torch.float64)
+    found = []
+    bodies = solids(config)
+    for number, one in enumerate(bodies):
+        kind = _kind(one)
+        name = kind if sum(_kind(other) == kind for other in bodies) == 1 else f"{kind} {number}"
+        body = build_obstacle(_sharp(one), like)
+        found.append(MovingBody(name, body, _motion(one, dim)))
+    return found
+
+
+def _kind(config: schema.SolidObstacle) -> str:
+    return type(config).__name__.removesuffix("Obstacle").replace("PointCloud", "point cloud").lower()
+
+
+def _sharp(config: schema.SolidObstacle) -> schema.SolidObstacle:
+    """Boxes as sharp as they can be: rounding serves the smoothness of fields, not of paths."""
+    if isinstance(config, schema.BoxObstacle) and config.rounding_m is None:
+        return replace(config, rounding_m=SHARP * min(config.sides_m))
+    return config
+
+
+def _motion(config: schema.SolidObstacle, dim: int) -> Motion:
+    if config.path_m is not None:
+        places = np.array([_vector("path_m", place, torch.zeros(dim)).tolist() for place in config.path_m])
+        return Waypoints(
+            np.asarray(config.path_times_s, dtype=float), places - np.asarray(config.centre_m, dtype=float)
+        )
+    velocity = config.velocity_m_per_s
+    return ConstantVelocity(np.zeros(dim) if velocity is None else np.asarray(velocity, dtype=float))
+
+
+def build_obstacle(config: schema.SolidObstacle, like: Float[Tensor, " D"]) -> Body:
     """One obstacle.
 
     Args:
@@ -56,8 +117,23 @@ def build_obstacle(config: schema.SolidObstacle, like: Float[Tensor, " D"]) -> O
             _vector("sides_m", config.sides_m, like)
             rounding = config.rounding_m if config.rounding_m is not None else min(config.sides_m) / 4
             return Box(centre, config.sides_m, rounding, _rotation(config.rotation_rad, dim), velocity)
+        case schema.MeshObstacle() | schema.PointCloudObstacle():
+            return _from_file(config, dim)
         case unknown:
             raise TypeError(f"no builder for {type(unknown).__name__}")
+
+
+def _from_file(config: schema.MeshObstacle | schema.PointCloudObstacle, dim: int) -> Body:
+    if dim != 3:
+        raise InvalidSetting("obstacle", _kind(config), "a sphere, ellipsoid or box: files hold bodies in space")
+    turn: Sequence[float] = config.rotation_rad if config.rotation_rad is not None else (0.0, 0.0, 0.0)
+    if len(turn) != 3:
+        raise InvalidSetting("obstacle.rotation_rad", turn, "three numbers, a rotation vector")
+    place = tuple(float(value) for value in config.centre_m)
+    placement = Placement(config.scale, (turn[0], turn[1], turn[2]), (place[0], place[1], place[2]))
+    if isinstance(config, schema.MeshObstacle):
+        return load_mesh(Path(config.file), placement)
+    return load_point_cloud(Path(config.file), config.radius_m, placement)
 
 
 def _vector(key: str, values: list[float], like: Float[Tensor, " D"]) -> Float[Tensor, " D"]:

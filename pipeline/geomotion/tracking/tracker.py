@@ -50,12 +50,14 @@ class Tracker:
     Args:
         config: Where runs are kept.
         reuse: Whether a finished stage with the same key is reused.
+        program: Whose runs ``latest`` looks through: `gms` or `ncds`.
 
     Raises:
         StoreUnavailable: If the store cannot be opened.
     """
 
-    def __init__(self, config: TrackingConfig, reuse: bool = True) -> None:
+    def __init__(self, config: TrackingConfig, reuse: bool = True, program: str = "ncds") -> None:
+        self.program = program
         self.uri = store.store_uri(config)
         self.reuse = reuse
         self.work = Path(config.root).resolve() / "work"
@@ -205,10 +207,14 @@ class Tracker:
     def _resolve(self, run: str) -> "Run":
         if run == "latest":
             runs = [
-                found for found in self._search(f"tags.`{COMMAND}` LIKE '%'") if MEMBER + "train" in found.data.tags
+                found
+                for found in self._search(f"tags.`{COMMAND}` LIKE '{self.program} %'")
+                if MEMBER + "train" in found.data.tags
             ]
             if not runs:
-                raise MissingRun(run, "no finished training in the store yet. Train one first: ncds train dataset=…")
+                raise MissingRun(
+                    run, f"no finished training in the store yet. Train one first: {self.program} train dataset=…"
+                )
             return runs[0]
         identity = run
         if "/" in run or Path(run).exists():
@@ -224,7 +230,9 @@ class Tracker:
             else []
         )
         if not runs:
-            raise MissingRun(run, "no such run in the store. `ncds ui` shows the runs; run=latest takes the newest")
+            raise MissingRun(
+                run, f"no such run in the store. `{self.program} ui` shows the runs; run=latest takes the newest"
+            )
         if len(runs) > 1:
             raise MissingRun(run, f"{len(runs)} runs begin like this; give more characters of the run id")
         return runs[0]

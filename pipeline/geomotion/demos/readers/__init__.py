@@ -1,8 +1,17 @@
 """Readers: from files to :class:`~geomotion.demos.demonstrations.Demonstrations`, one module per source."""
 
-from geomotion.config import DatasetConfig, FolderDataset, LasaDataset, LettersDataset, RoboTasks9Dataset
+from geomotion.config import (
+    DatasetConfig,
+    FolderDataset,
+    JCDataset,
+    LasaDataset,
+    LettersDataset,
+    PandaPouringDataset,
+    PandaReachDataset,
+    RoboTasks9Dataset,
+)
 from geomotion.demos.demonstrations import Demonstrations
-from geomotion.demos.generators import letters
+from geomotion.demos.generators import jc, letters, panda_pouring, panda_reach
 from geomotion.demos.readers import folder, lasa, robotasks9
 
 __all__ = ["read"]
@@ -24,5 +33,11 @@ def read(config: DatasetConfig) -> Demonstrations:
             return folder.read(config)
         case LettersDataset():
             return letters.generate(config)
+        case JCDataset():
+            return jc.generate(config)
+        case PandaReachDataset():
+            return panda_reach.generate(config)
+        case PandaPouringDataset():
+            return panda_pouring.generate(config)
         case _:
             raise TypeError(f"no reader for {type(config).__name__}")

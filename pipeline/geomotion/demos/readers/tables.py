@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geomotion.demos.columns import DEMO_COLUMNS, TIME_COLUMNS, column_names
-from geomotion.demos.demonstrations import CHANNEL_UNITS
+from geomotion.demos.demonstrations import CHANNEL_UNITS, UNIT_AXES
 from geomotion.errors import DatasetError
 
 Table = Mapping[str, NDArray[Any]]
@@ -120,8 +120,8 @@ def _split_axes(path: Path, name: str, values: NDArray[Any]) -> dict[str, NDArra
             path, f"{name} has shape {values.shape}; expected (time,), (time, axes) or (demo, time, axes)"
         )
     width = values.shape[1]
-    if name == "orientation_wxyz" and width != 4:
-        raise DatasetError(path, f"{name} has {width} axes; expected w, x, y, z")
+    if name in UNIT_AXES and width != len(UNIT_AXES[name]):
+        raise DatasetError(path, f"{name} has {width} axes; expected {', '.join(UNIT_AXES[name])}")
     axes = column_names(name, width) if name in CHANNEL_UNITS else [f"{name}_{axis}" for axis in range(width)]
     return {axis: values[:, number] for number, axis in enumerate(axes)}
 

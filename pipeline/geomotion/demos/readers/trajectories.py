@@ -14,13 +14,12 @@ from geomotion.demos.columns import (
     BOOKKEEPING_COLUMNS,
     DEMO_COLUMNS,
     METRES_PER,
-    QUATERNION_AXES,
     TIME_COLUMNS,
     Column,
     parse,
     sorted_axes,
 )
-from geomotion.demos.demonstrations import VELOCITY_OF, Array, Trajectory
+from geomotion.demos.demonstrations import UNIT_AXES, VELOCITY_OF, Array, Trajectory
 from geomotion.demos.readers.tables import Table
 from geomotion.errors import DatasetError
 
@@ -69,17 +68,18 @@ def _channel(path: Path, channel: str, table: Table, known: dict[str, Column], m
             names[column.axis] = name
     columns = [names[axis] for axis in sorted_axes(names)]
     values = np.stack([_numbers(path, name, table[name]) for name in columns], axis=1)
-    if channel == "orientation_wxyz":
-        _require_all_axes(path, names)
+    if channel in UNIT_AXES:
+        _require_all_axes(path, channel, names)
     if channel in ("position_m", "velocity_m_per_s"):
         units = [known[name].unit for name in columns]
         return np.asarray(values * [METRES_PER[unit] if unit else metres_per_unit for unit in units])
     return values
 
 
-def _require_all_axes(path: Path, axes: Iterable[str]) -> None:
-    if set(axes) != set(QUATERNION_AXES):
-        raise DatasetError(path, f"orientation has axes {', '.join(sorted(axes))}; expected w, x, y, z")
+def _require_all_axes(path: Path, channel: str, axes: Iterable[str]) -> None:
+    if set(axes) != set(UNIT_AXES[channel]):
+        what, expected = channel.partition("_")[0], ", ".join(UNIT_AXES[channel])
+        raise DatasetError(path, f"{what} has axes {', '.join(sorted(axes))}; expected {expected}")
 
 
 def _numbers(path: Path, name: str, values: NDArray[Any]) -> Array:

@@ -1,14 +1,17 @@
-"""The pictures of a run, inlined, with captions that say what to look for; and why others are missing."""
+"""Pictures and films of a run, inlined, with captions that say what to look for."""
 
 from base64 import b64encode
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from geomotion.figures.arrays import EvaluationArrays
 from geomotion.figures.style import PNG_DPI
 
 SCREEN_DPI = 130  # a little larger than in print
-PNG_WIDTH = slice(16, 20)  # where the header of a PNG says it
+PNG_WIDTH, GIF_WIDTH = slice(16, 20), slice(6, 8)  # where headers say it
+FILM_WIDTH = 640
+
+Captions = Mapping[str, tuple[str, str]]
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,7 @@ class Picture:
     Attributes:
         title: What it shows.
         caption: What to look for.
-        source: PNG as a data URI.
+        source: PNG or GIF as a data URI.
         width: Width on the screen [px]; the same scale for all, so that their letters have one size.
     """
 
@@ -28,67 +31,29 @@ class Picture:
     width: int
 
 
-CAPTIONS = {
-    "demonstrations": (
-        "Demonstrations",
-        "What was recorded, after preprocessing: all that the model has seen of the task.",
-    ),
-    "motion": (
-        "Learned motion",
-        "Orange should lie on black: each rollout starts where its demonstration starts and is never corrected. Dotted "
-        "and dashed curves were kept from training. Green and grey, where present, show what happens elsewhere.",
-    ),
-    "eigenvalues": (
-        "Where the field contracts",
-        "Blue: nearby motions approach each other at once. Red, outlined and hatched in maps: they part at first. The "
-        "panels share one scale, cut at the 95th percentile. Only the true Jacobian describes the motion.",
-    ),
-    "nearby": (
-        "Nearby motions",
-        "Do they come together? Below 1 they are closer than at the start. The solid curve has to stay under the "
-        "dashed bound where one is proven; the Euclidean curve may rise above 1 first.",
-    ),
-    "region": (
-        "Time inside the demonstration region",
-        "Rollouts from an equidistant grid, strong where they are inside the convex hull of the demonstrations, "
-        "Eq. (6.10). Bars far to the right mean that motions enter soon and stay.",
-    ),
-    "goal_starts": (
-        "Starts that never reach the goal",
-        "From crosses, the motion stops elsewhere, circles, diverges, or is too slow for the time allowed.",
-    ),
-    "training": (
-        "Training",
-        "The total should have levelled off; if it still falls at the end, more steps would help.",
-    ),
-}
+def pictures(folders: Sequence[Path], captions: Captions) -> dict[str, Picture]:
+    """The pictures that lie in the figure folders, by name, in the order of the captions.
 
-
-def pictures(folders: tuple[Path, ...]) -> dict[str, Picture]:
-    """The known pictures that lie in the figure folders, by name, in the order of the page."""
+    Args:
+        folders: Where stages left pictures.
+        captions: Title and caption of each known name.
+    """
     found = {}
-    for name, (title, caption) in CAPTIONS.items():
+    for name, (title, caption) in captions.items():
         path = next((folder / f"{name}.png" for folder in folders if (folder / f"{name}.png").is_file()), None)
         if path is not None:
             png = path.read_bytes()
             width = int.from_bytes(png[PNG_WIDTH], "big")
-            source = f"data:image/png;base64,{b64encode(png).decode()}"
-            found[name] = Picture(title, caption, source, round(width * SCREEN_DPI / PNG_DPI))
+            found[name] = Picture(title, caption, _data_uri("png", png), round(width * SCREEN_DPI / PNG_DPI))
     return found
 
 
-def missing(present: dict[str, Picture], data: EvaluationArrays) -> dict[str, str]:
-    """Why pictures or parts of them are not on the page, by title."""
-    reasons = {}
-    if data.dim != 2:
-        reasons["Vector field, eigenvalue map, region"] = (
-            f"they are drawn in a plane; the state has {data.dim} dimensions"
-        )
-    if data.eigenvalues is not None and data.eigenvalues.jhat is None:
-        reasons["Eigenvalues of Ĵ"] = "only a line-integral field has a matrix Ĵ, Eq. (5.1)"
-    if not data.has_held_out:
-        reasons["Held-out demonstrations"] = "none were judged"
-    if data.goal_starts is not None and data.goal_starts.reached.all():
-        reasons[CAPTIONS["goal_starts"][0]] = f"all {len(data.goal_starts.reached)} starts reach it"
-    absent = [name for name in ("demonstrations", "motion", "training") if name not in present]
-    return reasons | {CAPTIONS[name][0]: "its stage left no picture" for name in absent}
+def film(path: Path, title: str, caption: str) -> Picture:
+    """A film as an animated GIF, enlarged so far that it is seen well."""
+    gif = path.read_bytes()
+    width = int.from_bytes(gif[GIF_WIDTH], "little")
+    return Picture(title, caption, _data_uri("gif", gif), min(max(width, FILM_WIDTH), 2 * width))
+
+
+def _data_uri(kind: str, content: bytes) -> str:
+    return f"data:image/{kind};base64,{b64encode(content).decode()}"

@@ -1,0 +1,1 @@
+"""Riemannian geometry of learned manifolds: pulled-back metrics, curves, latent grids, geodesics."""

@@ -1,0 +1,260 @@
+"""Judge a manifold: geodesics between the ends of demonstrations, beside the demonstrations themselves."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomotion.config import EndEffectorFrame, GeodesicEvaluationConfig, MetricConfig, PlanningConfig
+from geomotion.demos import storage
+from geomotion.demos.poses import pose_paths
+from geomotion.figures.geodesics import JudgedGeodesic, save_geodesics_figure
+from geomotion.figures.methods import save_methods_figure
+from geomotion.files import atomic, write_json
+from geomotion.planning.carrying import meet
+from geomotion.planning.plan import Plan
+from geomotion.planning.planner import Planner, Query
+from geomotion.scores.evaluation import Evaluation, combine
+from geomotion.scores.paths import (
+    PoseDistance,
+    PosePath,
+    dimensionless_jerk,
+    dtwd_ratio,
+    mean_path_with_blended_ends,
+    pose_dtwd,
+    turning_rad,
+)
+from geomotion.scores.score import Score, max_score, mean_score, share_score
+from geomotion.scores.table import scores_table
+from geomotion.stages import planners
+from geomotion.stages.graph import Skilled, load_skilled
+from geomotion.stages.methods import compare_methods
+from geomotion.tracking import Artefacts, StageRun
+
+__all__ = ["EvaluateGeodesicsConfig", "evaluate_geodesics", "scores_table"]
+
+MM = 1000.0
+
+
+@dataclass(frozen=True)
+class EvaluateGeodesicsConfig:
+    """What the evaluate stage of `gms` needs."""
+
+    evaluation: GeodesicEvaluationConfig
+    planning: PlanningConfig
+    metric: MetricConfig
+    frame: EndEffectorFrame
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One demonstration and what stands in for it.
+
+    Attributes:
+        number: Of the demonstration.
+        demonstration: Its poses.
+        plan: From its first to its last pose.
+        averaged: Mean of the training demonstrations, brought to its ends.
+        line: Decoded straight latent line, brought to its ends; None without a plan.
+        others: Training demonstrations other than itself.
+    """
+
+    number: int
+    demonstration: PosePath
+    plan: Plan
+    averaged: PosePath
+    line: PosePath | None
+    others: list[PosePath]
+
+    @property
+    def geodesic(self) -> PosePath | None:
+        """The planned path."""
+        return None if self.plan.path is None else self.plan.path.poses
+
+    def ratio(self, path: PosePath) -> PoseDistance:
+        """DTWD of a path, over the mean DTWD between this demonstration and the others."""
+        return dtwd_ratio(path, self.demonstration, self.others)
+
+
+def evaluate_geodesics(config: EvaluateGeodesicsConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
+    """Write ``scores.json``, ``evaluation.npz`` and the picture.
+
+    Held-out demonstrations are judged; where there are none, those that were trained on.
+    """
+    skilled = load_skilled(inputs, config.metric)
+    demonstrations = storage.load(inputs["ingest"].folder)
+    planner = planners.planner(skilled, config.planning, config.frame)
+    paths = pose_paths(demonstrations, config.evaluation.samples)
+    training = [paths[number] for number in skilled.skill.train_demos]
+    numbers = skilled.skill.test_demos or skilled.skill.train_demos
+    subset = "heldout" if skilled.skill.test_demos else "train"
+    same_group = [_comrades(skilled, demonstrations.groups, number) for number in numbers]
+    judged = [
+        judge(planner, number, paths[number], [paths[one] for one in others])
+        for number, others in zip(numbers, same_group, strict=True)
+    ]
+    evaluation = combine([score(planner, judged, subset), pairs(planner, demonstrations.groups, skilled, paths)])
+    if config.evaluation.compare_methods:
+        compared = compare_methods(skilled, config.planning, config.frame, paths[numbers[0]])
+        evaluation = combine([evaluation, compared.evaluation])
+        maps = skilled.latent_maps(planner.settings.cap_m, planner.settings.cap_rad)
+        if maps is not None:
+            save_methods_figure(compared.curves, maps, run.folder / "figures")
+    write_json(
+        run.folder / "scores.json", evaluation.document("geodesics between ends of demonstrations", demonstrations.name)
+    )
+    with atomic(run.folder / "evaluation.npz") as temporary:
+        np.savez_compressed(temporary, allow_pickle=False, **evaluation.arrays)
+    run.log_scores(evaluation.scores)
+    save_geodesics_figure([_drawn(one) for one in judged], training, run.folder / "figures")
+
+
+def judge(planner: Planner, number: int, demonstration: PosePath, others: list[PosePath]) -> Judged:
+    """Plan from the first to the last pose of a demonstration, and make what the plan is compared with."""
+    query = planner.query(demonstration[:1], demonstration[-1:])
+    plan = planner.plan(query)
+    averaged = mean_path_with_blended_ends(others, demonstration[:1], demonstration[-1:], len(demonstration))
+    return Judged(number, demonstration, plan, averaged, straight_line(planner, query, plan), others)
+
+
+def straight_line(planner: Planner, query: Query, plan: Plan) -> PosePath | None:
+    """The decoded straight latent line between the ends of a plan, brought to the same poses."""
+    if plan.path is None:
+        return None
+    decoded = planner.manifold.decode(np.linspace(plan.codes[0], plan.codes[-1], len(plan.codes)))
+    return meet(query.offsets.carry(decoded.poses, decoded.progress), query.ends)
+
+
+def score(planner: Planner, judged: Sequence[Judged], subset: str) -> Evaluation:
+    """All scores of some judged demonstrations.
+
+    Args:
+        planner: With the demonstrated poses.
+        judged: Demonstrations with their plans.
+        subset: First part of the scores' names.
+    """
+    planned = [one for one in judged if one.geodesic is not None]
+    scores: dict[str, Score] = {"planned_share": share_score([one.plan.found for one in judged], "a path was found")}
+    omitted = {f"{subset}.demonstration {one.number}": one.plan.reason for one in judged if one.geodesic is None}
+    if planned:
+        scores |= _reproduction(planned) | _support(planner, planned) | _geometry(planned)
+    arrays = {}
+    for one in planned:
+        for name, path in (("demo", one.demonstration), ("geodesic", one.geodesic), ("averaged", one.averaged)):
+            assert path is not None
+            arrays[f"{name}_{one.number}_position_m"] = path.position_m
+            arrays[f"{name}_{one.number}_orientation"] = path.orientation
+    return Evaluation({f"{subset}.{name}": found for name, found in scores.items()}, arrays, omitted)
+
+
+def pairs(planner: Planner, groups: Sequence[str], skilled: Skilled, paths: Sequence[PosePath]) -> Evaluation:
+    """From the start of every group of training demonstrations to the goal of every one, shown or not (Sec. 3.6.2)."""
+    first = {groups[number]: number for number in reversed(skilled.skill.train_demos)}
+    if len(first) < 2:
+        return Evaluation()
+    plans = {
+        (start, goal): planner.plan(planner.query(paths[first[start]][:1], paths[first[goal]][-1:]))
+        for start in sorted(first)
+        for goal in sorted(first)
+    }
+    omitted = {f"pairs.{start} to {goal}": plan.reason for (start, goal), plan in plans.items() if not plan.found}
+    note = f"of {len(first)} starts with {len(first)} goals; {len(first)} pairs were demonstrated"
+    return Evaluation({"pairs.planned_share": share_score([plan.found for plan in plans.values()], note)}, {}, omitted)
+
+
+def _reproduction(planned: Sequence[Judged]) -> dict[str, Score]:
+    rows = [one.geodesic for one in planned]
+    distances = [
+        pose_dtwd(path, one.demonstration) for path, one in zip(rows, planned, strict=True) if path is not None
+    ]
+    scores = {
+        "position_dtwd_per_point": mean_score([MM * one.position for one in distances], "mm", "sum of two means"),
+        "orientation_dtwd_per_point": mean_score([one.orientation for one in distances], "rad", "sum of two means"),
+    }
+    kinds: dict[str, tuple[list[PosePath | None], str]] = {
+        "": ([one.geodesic for one in planned], "over the mean DTWD from the demonstration to the training ones"),
+        "_of_averaged_demo": (
+            [one.averaged for one in planned],
+            "baseline: mean of the training demonstrations, ends blended",
+        ),
+        "_of_straight_line": ([one.line for one in planned], "baseline: straight latent line, ends blended"),
+    }
+    for suffix, (paths, note) in kinds.items():
+        ratios = [one.ratio(path) for one, path in zip(planned, paths, strict=True) if path is not None]
+        scores[f"position_dtwd_ratio{suffix}"] = mean_score([one.position for one in ratios], "1", note)
+        scores[f"orientation_dtwd_ratio{suffix}"] = mean_score([one.orientation for one in ratios], "1", note)
+    return scores
+
+
+def _support(planner: Planner, planned: Sequence[Judged]) -> dict[str, Score]:
+    settings = planner.settings
+    found = [one.plan.scores for one in planned if one.plan.scores is not None]
+    demos = [planner.support.distances(one.demonstration.position_m, one.demonstration.orientation) for one in planned]
+    shares = [
+        planner.support.share_within(one.geodesic.position_m, settings.cap_m)
+        for one in planned
+        if one.geodesic is not None
+    ]
+    note = "largest distance of a pose to the nearest demonstrated one"
+    return {
+        "farthest_from_data": max_score([MM * one.apart_m for one in found], "mm", note),
+        "farthest_from_data_of_demo": max_score(
+            [MM * float(apart.max()) for apart, _ in demos], "mm", "the demonstration itself"
+        ),
+        "farthest_turn_from_data": max_score(
+            [one.apart_rad for one in found], "rad", "to orientations demonstrated nearby"
+        ),
+        "farthest_turn_from_data_of_demo": max_score(
+            [float(turn.max()) for _, turn in demos], "rad", "the demonstration itself"
+        ),
+        "share_in_support": mean_score(
+            shares, "1", f"of positions within {MM * settings.cap_m:.0f} mm of a demonstrated one"
+        ),
+    }
+
+
+def _geometry(planned: Sequence[Judged]) -> dict[str, Score]:
+    found = [one.plan.scores for one in planned if one.plan.scores is not None]
+    paths = [one.geodesic for one in planned if one.geodesic is not None]
+    demos = [one.demonstration for one in planned]
+    return {
+        "energy": mean_score([one.energy for one in found], "1", "in the thesis' metric"),
+        "energy_of_straight_line": mean_score(
+            [one.line_energy for one in found], "1", "baseline: straight latent line"
+        ),
+        "start_residual": mean_score(
+            [MM * one.start_residual_m for one in found], "mm", "manifold to wanted start, bridged"
+        ),
+        "goal_residual": mean_score(
+            [MM * one.goal_residual_m for one in found], "mm", "manifold to wanted goal, bridged"
+        ),
+        "turning": mean_score([turning_rad(path.position_m) for path in paths], "rad", "of the position path, at 1 cm"),
+        "turning_of_demo": mean_score(
+            [turning_rad(path.position_m) for path in demos], "rad", "the demonstration itself"
+        ),
+        "jerk": mean_score(
+            [dimensionless_jerk(path.position_m) for path in paths], "1", "dimensionless, of the position path"
+        ),
+    }
+
+
+def _comrades(skilled: Skilled, groups: tuple[str, ...], number: int) -> list[int]:
+    """Training demonstrations of the same group; all of them, where it has none."""
+    own = [one for one in skilled.skill.train_demos if groups[one] == groups[number] and one != number]
+    return own or [one for one in skilled.skill.train_demos if one != number]
+
+
+def _drawn(one: Judged) -> JudgedGeodesic:
+    ratio = PoseDistance(np.nan, np.nan) if one.geodesic is None else one.ratio(one.geodesic)
+    averaged = one.ratio(one.averaged)
+    return JudgedGeodesic(
+        one.number,
+        one.demonstration,
+        one.geodesic,
+        one.averaged,
+        one.line,
+        ratio.position,
+        ratio.orientation,
+        averaged.position,
+        averaged.orientation,
+    )

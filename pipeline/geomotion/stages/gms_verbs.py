@@ -1,0 +1,142 @@
+"""The verbs of `gms` as chains of stages."""
+
+from geomotion.config import DatasetConfig, GmsConfig
+from geomotion.files import read_json
+from geomotion.stages import compare, shared
+from geomotion.stages.evaluate_geodesics import EvaluateGeodesicsConfig, evaluate_geodesics, scores_table
+from geomotion.stages.graph import GraphStageConfig, graph, graph_table
+from geomotion.stages.ingest import ingest
+from geomotion.stages.plan import PlanStageConfig, plan, plan_table
+from geomotion.stages.replay import ReplayStageConfig, replay, replay_table
+from geomotion.stages.report_gms import ReportConfig, report_gms
+from geomotion.stages.session import Program, Session, Step, VerbResult
+from geomotion.stages.train_manifold import TrainManifoldConfig, train_manifold
+from geomotion.tracking import Stage
+
+
+def _train_config(session: Session) -> TrainManifoldConfig:
+    config: GmsConfig = session.config
+    dataset = config.dataset
+    # the base class: where recordings come from must not decide whether a training is repeated
+    selection = DatasetConfig(dataset.name, dataset.state_channels, dataset.train_demos, dataset.test_demos)
+    return TrainManifoldConfig(selection, config.manifold, config.training, config.seed)
+
+
+def _graph_config(session: Session) -> GraphStageConfig:
+    return GraphStageConfig(session.config.graph, session.config.metric)
+
+
+def _plan_config(session: Session) -> PlanStageConfig:
+    config: GmsConfig = session.config
+    return PlanStageConfig(config.planning, config.metric, config.obstacle, config.robot.frame)
+
+
+def _evaluate_config(session: Session) -> EvaluateGeodesicsConfig:
+    config: GmsConfig = session.config
+    return EvaluateGeodesicsConfig(config.evaluation, config.planning, config.metric, config.robot.frame)
+
+
+def _replay_config(session: Session) -> ReplayStageConfig:
+    config: GmsConfig = session.config
+    return ReplayStageConfig(config.robot, config.planning, config.metric, config.obstacle)
+
+
+def _report_config(session: Session) -> ReportConfig:
+    return ReportConfig(command=session.reproduction)
+
+
+SKILL = ("ingest", "train", "graph")
+REPORTED = (*SKILL, "plan", "evaluate")
+STEPS = {
+    "ingest": Step(Stage("ingest", ingest, reads_outside=True), (), lambda session: session.config.dataset),
+    "train": Step(Stage("train", train_manifold), ("ingest",), _train_config),
+    "graph": Step(Stage("graph", graph), ("ingest", "train"), _graph_config),
+    "plan": Step(Stage("plan", plan, reads_outside=True), SKILL, _plan_config),
+    "evaluate": Step(Stage("evaluate", evaluate_geodesics), SKILL, _evaluate_config),
+    "replay": Step(Stage("replay", replay), (*SKILL, "plan"), _replay_config),
+    "report": Step(Stage("report", report_gms), (*REPORTED, "replay"), _report_config),
+    "report without robot": Step(Stage("report", report_gms), REPORTED, _report_config),
+}
+
+
+def _train(session: Session) -> VerbResult:
+    found = session.produce("train")
+    training = read_json(found.path("training.json"))
+    health = "good" if training["is_good"] else "NOT good: try another seed, or more training.steps"
+    text = (
+        f"latent space  {health}; {training['unexplained_variance']:.2%} of the variance is missed, "
+        f"{training['folded_share']:.1%} is folded, {training['attempts']} attempt(s)\n"
+        f"model  {found.path('model.pt')}\nnext   gms plan run={found.run_id[:8]}"
+    )
+    return VerbResult(text, session.document(training=training))
+
+
+def _graph(session: Session) -> VerbResult:
+    found = session.produce("graph")
+    document = read_json(found.path("graph.json"))
+    text = f"{graph_table(document)}\n\npicture  {found.path('figures')}"
+    return VerbResult(text, session.document(graph=document))
+
+
+def _plan(session: Session) -> VerbResult:
+    found = session.produce("plan")
+    document = read_json(found.path("plan.json"))
+    places = f"picture  {found.path('figures/plan.png')}\nin 3-D   {found.path('scene.html')}"
+    path = f"\npath     {found.path('path.npz')}" if document["found"] else ""
+    text = f"{plan_table(document)}\n\n{places}{path}"
+    return VerbResult(text, session.document(plan=document), exit_code=0 if document["found"] else NO_PATH)
+
+
+def _evaluate(session: Session) -> VerbResult:
+    found = session.produce("evaluate")
+    scores = read_json(found.path("scores.json"))
+    text = f"{scores_table(scores)}\n\nscores  {found.path('scores.json')}"
+    return VerbResult(text, session.document(scores=scores), objective=compare.objective(scores))
+
+
+def _replay(session: Session) -> VerbResult:
+    found = session.produce("replay")
+    document = read_json(found.path("replay.json"))
+    film = found.folder / "film.gif"
+    text = replay_table(document) + (f"\n\nfilm  {film}" if film.exists() else "")
+    return VerbResult(text, session.document(replay=document), exit_code=0 if document["executed"] else NO_PATH)
+
+
+def _report(session: Session) -> VerbResult:
+    summary = read_json(session.produce("ingest").path("summary.json"))
+    name = "report" if summary["space"].startswith("R3xS3") else "report without robot"
+    path = str(session.produce(name).path("report.html"))
+    return VerbResult(f"report  {path}", session.document(report=path))
+
+
+def _run(session: Session) -> VerbResult:
+    planned = read_json(session.produce("plan").path("plan.json"))
+    evaluated, reported = _evaluate(session), _report(session)
+    lines = [plan_table(planned), "", evaluated.text]
+    document = evaluated.document | {"plan": planned} | reported.document
+    if "replay" in session.done:
+        document["replay"] = read_json(session.done["replay"].path("replay.json"))
+        lines += ["", replay_table(document["replay"])]
+    text = "\n".join([*lines, "", reported.text])
+    return VerbResult(text, document, exit_code=0 if planned["found"] else NO_PATH, objective=evaluated.objective)
+
+
+NO_PATH = 3  # an answer, not a mistake: scripts can tell it from both
+
+GMS = Program(
+    name="gms",
+    steps=STEPS,
+    verbs={
+        "ingest": shared.ingest_verb,
+        "train": _train,
+        "graph": _graph,
+        "plan": _plan,
+        "eval": _evaluate,
+        "replay": _replay,
+        "report": _report,
+        "run": _run,
+        "compare": shared.compare_verb,
+        "check": shared.check_verb,
+    },
+    execution_keys=shared.EXECUTION_KEYS | {"metric", "graph", "planning", "robot"},
+)

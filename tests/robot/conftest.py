@@ -1,0 +1,36 @@
+"""A simulated arm, and recorded poses for it to take."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+TASKS = ("wineglass", "bottle2shelf", "openbox", "pouring", "scoop", "matfolding")
+DEMO_S = 1000 / 60
+
+
+@pytest.fixture
+def scene():
+    from geomotion.robot.scene import PandaScene
+
+    with PandaScene() as scene:
+        yield scene
+
+
+@pytest.fixture(scope="session")
+def recorded(robotasks9_folder: Path):
+    """Task -> 200 poses of its demonstration 7: positions [m] and quaternions."""
+
+    def poses(task: str) -> tuple[np.ndarray, np.ndarray]:
+        rows = np.load(robotasks9_folder / f"{task}.npy")[7][np.linspace(0, 999, 200).round().astype(int)]
+        return rows[:, :3] / 100, rows[:, 3:]
+
+    return poses
+
+
+def arc(count: int = 60) -> np.ndarray:
+    """Joint positions of a smooth sweep in front of the arm [rad]."""
+    from geomotion.robot import panda
+
+    s = np.linspace(0, 1, count)[:, None]
+    return panda.HOME_RAD + np.sin(np.pi * s * np.array([0.5, 0.4, 0.3, 0.5, 0.7, 0.6, 1.0])) * 0.6
