@@ -49,7 +49,8 @@ bench: $(STAMP)  ## time velocity queries, integration, training, graphs and rep
 
 regress: $(STAMP)  ## small pinned experiments against their stored scores
 	@for name in $(notdir $(basename $(wildcard conf/experiment/regression/*.yaml))); do \
-		$(BIN)/ncds check experiment=regression/$$name || exit 1; done
+		case $$name in gms_*) program=gms;; *) program=ncds;; esac; \
+		$(BIN)/$$program check experiment=regression/$$name || exit 1; done
 
 ui: $(STAMP)  ## MLflow pages of runs/
 	$(BIN)/ncds ui

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from geomotion import config as schema
 from geomotion.errors import CorruptArtefact
 from geomotion.files import write_tensors
-from geomotion.manifolds.density import DensityFactor, mean_distance_between
+from geomotion.manifolds.density import DensityFactor, GroupedDensity, mean_distance_between
 from geomotion.networks.pose_vae import PoseVAE
 from geomotion.planning.manifold import DecodedPath
 from geomotion.planning.planner import Anchors
@@ -131,10 +131,7 @@ class PoseManifold:
         else:
             self.other_codes = np.zeros((0, self.latent_dim))
         self.all_codes = torch.cat(codes).numpy()
-        self._factors = [
-            DensityFactor(own, [0] * len(own), metric.density_bandwidth * spacing, metric.density_power)
-            for own, spacing in _by_group(codes, groups, self.codes, data.groups)
-        ]
+        self._density = self._grouped_density(codes, groups, metric)
 
     # ------------------------------------------------------------ as arrays, for planning
     def decode(self, z: Codes) -> DecodedPath:
@@ -150,7 +147,7 @@ class PoseManifold:
 
     def stretch(self, z: Codes) -> Float[np.ndarray, " point"]:
         """Conformal factor f."""
-        return np.asarray(self._factor(torch.from_numpy(np.ascontiguousarray(z))).numpy())
+        return np.asarray(self._density(torch.from_numpy(np.ascontiguousarray(z))).numpy())
 
     def encode(self, pose: PosePath, progress: float) -> Codes:
         """Latent point of one pose, shape (1, d)."""
@@ -183,11 +180,19 @@ class PoseManifold:
 
     def conformal(self, z: Tensor) -> Tensor:
         """Conformal factor f."""
-        return self._factor(z)
+        return self._density(z)
 
-    def _factor(self, z: Tensor) -> Tensor:
-        """That of the group that covers a point best: wide groups are no worse than narrow ones."""
-        return torch.stack([factor(z) for factor in self._factors]).amin(dim=0)
+    def _grouped_density(
+        self, codes: Sequence[Tensor], groups: Sequence[int], metric: schema.MetricConfig
+    ) -> GroupedDensity:
+        """Each group's kernels are as wide as its own demonstrations are apart."""
+        factors = []
+        for group in dict.fromkeys(groups):
+            demonstrated = [one for one, own in zip(self.codes, self.data.groups, strict=True) if own == group]
+            spacing = mean_distance_between(demonstrated, [group] * len(demonstrated))
+            covered = torch.cat([one for one, own in zip(codes, groups, strict=True) if own == group])
+            factors.append(DensityFactor(covered, metric.density_bandwidth * spacing, metric.density_power))
+        return GroupedDensity(factors)
 
     def blocks(self, z: Tensor) -> tuple[Tensor, Tensor]:
         """Position block and orientation block."""
@@ -204,18 +209,6 @@ class PoseManifold:
 
 
 MIXTURE_SEED = 0
-
-
-def _by_group(
-    codes: Sequence[Tensor], groups: Sequence[int], demonstrated: Sequence[Tensor], own_groups: Sequence[int]
-) -> list[tuple[list[Tensor], float]]:
-    """Codes of each group, and the mean distance between its demonstrations."""
-    found = []
-    for group in dict.fromkeys(own_groups):
-        members = [one for one, own in zip(demonstrated, own_groups, strict=True) if own == group]
-        spacing = mean_distance_between(members, [0] * len(members))
-        found.append(([one for one, own in zip(codes, groups, strict=True) if own == group], spacing))
-    return found
 
 
 ANCHOR_ROOM = 1.5  # times the demonstrated spread of starts: how near a start has to be to count as the same

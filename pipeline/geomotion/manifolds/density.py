@@ -16,38 +16,48 @@ class DensityFactor:
     r"""f(z) = clip((ρ₉₀ / ρ(z))^p, 0.01, 1e5), ρ a Gaussian kernel density of the encoded demonstrations.
 
     f²M is again a Riemannian metric. Plain geodesics take the inner edge of the tube that demonstrations span; with f
-    they keep to where demonstrations are dense. Every group of demonstrations weighs the same, however many it has.
+    they keep to where demonstrations are dense.
 
     Args:
-        codes: Encoded demonstrations, one tensor each, shape (point, d).
-        groups: Group of each demonstration.
+        codes: Encoded demonstrations.
         bandwidth: Standard deviation of the kernels.
         power: p; 0 gives the thesis' metric.
     """
 
-    def __init__(
-        self, codes: Sequence[Float[Tensor, "_ d"]], groups: Sequence[int], bandwidth: float, power: float
-    ) -> None:
-        self.codes = torch.cat(list(codes))
-        members = list(zip(codes, groups, strict=True))
-        sizes = {group: sum(len(one) for one, own in members if own == group) for group in groups}
-        self._log_weights = -torch.cat([torch.full_like(one[:, 0], sizes[group]) for one, group in members]).log()
-        self._bandwidth, self._power = bandwidth, power
-        densities = torch.cat([self._log_density(part) for part in torch.split(self.codes, CODES_AT_ONCE)])
+    def __init__(self, codes: Float[Tensor, "point d"], bandwidth: float, power: float) -> None:
+        self.codes, self._precision, self._power = codes, 0.5 / bandwidth**2, power
+        self._from_codes = -self._precision * (codes * codes).sum(dim=-1)
+        densities = torch.cat([self._log_sum(part) for part in torch.split(codes, CODES_AT_ONCE)])
         self._log_reference = torch.quantile(densities, REFERENCE_QUANTILE)
 
     def __call__(self, z: Float[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         if self._power == 0:
             return torch.ones_like(z[..., 0])
-        log_factor = self._power * (self._log_reference - self._log_density(z))
+        log_factor = self._power * (self._log_reference - self._log_sum(z))
         return log_factor.exp().clamp(SMALLEST_FACTOR, LARGEST_FACTOR)
 
-    def _log_density(self, z: Float[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
-        precision = 0.5 / self._bandwidth**2
+    def _log_sum(self, z: Float[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
+        """log of the sum of all kernels: the density but for a constant."""
         squares = (z * z).sum(dim=-1)  # the same for all codes, so left to the end: one matrix of codes is enough
-        rest = self._log_weights - precision * (self.codes * self.codes).sum(dim=-1)
-        exponents = torch.addmm(rest, z.reshape(-1, z.shape[-1]), self.codes.T, alpha=2 * precision)
-        return torch.logsumexp(exponents, dim=-1).reshape(squares.shape) - precision * squares
+        points = z.reshape(-1, z.shape[-1])
+        exponents = torch.addmm(self._from_codes, points, self.codes.T, alpha=2 * self._precision)
+        return torch.logsumexp(exponents, dim=-1).reshape(squares.shape) - self._precision * squares
+
+
+class GroupedDensity:
+    """The smallest factor of several groups of demonstrations: that of the group that covers a point best.
+
+    Groups weigh the same, however many demonstrations they have and however far these lie apart.
+
+    Args:
+        factors: One for each group.
+    """
+
+    def __init__(self, factors: Sequence[DensityFactor]) -> None:
+        self._factors = tuple(factors)
+
+    def __call__(self, z: Float[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
+        return torch.stack([factor(z) for factor in self._factors]).amin(dim=0)
 
 
 def mean_distance_between(codes: Sequence[Float[Tensor, "_ d"]], groups: Sequence[int]) -> float:

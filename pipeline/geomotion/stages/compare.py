@@ -6,7 +6,12 @@ from typing import Any
 
 from geomotion.tables import aligned
 
-OBJECTIVE = ("heldout.dtwd_per_point", "train.dtwd_per_point")
+OBJECTIVE = (
+    "heldout.dtwd_per_point",
+    "heldout.position_dtwd_ratio",
+    "train.dtwd_per_point",
+    "train.position_dtwd_ratio",
+)
 
 
 def objective(scores: Mapping[str, Any]) -> float | None:

@@ -178,7 +178,7 @@ def _spread_and_volume(manifold: PoseManifold, surface: Surface) -> tuple[np.nda
     nodes = torch.from_numpy(surface.grid.nodes)
     metric = PullbackMetric(manifold)
     log_std = manifold.network.std(nodes).log10().numpy()
-    batches = [log_magnification(metric(batch)) for batch in nodes.split(MAP_POINTS)]
+    batches = [log_magnification(metric(batch)) for batch in torch.split(nodes, MAP_POINTS)]
     return log_std.reshape(surface.grid.shape), torch.cat(batches).numpy().reshape(surface.grid.shape)
 
 
