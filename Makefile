@@ -25,8 +25,10 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install -q --prefer-binary $(PIP_ARGS) -c constraints.txt -e '.[dev,sweep]'
 	@touch $@
 
-demo: $(STAMP)  ## the main job on generated handwriting: train, roll out, score; ends with the report's path
-	$(BIN)/ncds run dataset=letters/j training.haste_weight=0.05
+demo: $(STAMP)  ## both programs on generated motions: train, score, execute; names both reports at the end
+	@ncds=$$($(BIN)/ncds run dataset=letters/j training.haste_weight=0.05) || exit $$?; printf '%s\n' "$$ncds"; \
+	gms=$$($(BIN)/gms run dataset=panda/reach_to_grasp training.steps=2500) || exit $$?; printf '%s\n' "$$gms"; \
+	printf '\nncds '; printf '%s\n' "$$ncds" | tail -n 1; printf 'gms  '; printf '%s\n' "$$gms" | tail -n 1
 
 test: $(STAMP)  ## all tests
 	$(BIN)/python -m pytest

@@ -5,6 +5,7 @@ send all of them back.
 """
 
 import json
+import math
 import os
 import re
 import signal
@@ -21,7 +22,7 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from geomotion.config import CommandConfig, Output
+from geomotion.config import CommandConfig, Output, plain
 from geomotion.errors import Interrupted
 from geomotion_cli.failures import Failure, Reporter, UsageMistake, did_you_mean, pipeline_error, usage_error
 from geomotion_cli.hydra_errors import retell, unknown_setting
@@ -158,7 +159,22 @@ def _typed(config: DictConfig) -> CommandConfig:
     assert isinstance(settings, CommandConfig)
     if foreign := _foreign_keys(settings):
         raise UsageMistake(unknown_setting(foreign[0], config))
+    if key := _not_finite(plain(settings)):
+        raise UsageMistake(f"{key} is or holds a number that is not finite; expected finite numbers.")
     return settings
+
+
+def _not_finite(settings: Any, key: str = "") -> str:
+    """The first key whose value is or holds NaN or infinity, which make no sense anywhere; empty if there is none."""
+    match settings:
+        case dict():
+            found = (_not_finite(value, f"{key}.{name}" if key else name) for name, value in settings.items())
+            return next(filter(None, found), "")
+        case list():
+            return key if any(_not_finite(value, key) for value in settings) else ""
+        case float() if not math.isfinite(settings):
+            return key
+    return ""
 
 
 def _foreign_keys(settings: Any, prefix: str = "") -> list[str]:

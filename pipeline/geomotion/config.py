@@ -138,12 +138,14 @@ class LasaDataset(DatasetConfig):
 class RoboTasks9Dataset(DatasetConfig):
     """Franka end-effector poses, kinesthetic teaching, nine demonstrations a task."""
 
-    task: str = MISSING
+    task: str = MISSING  # any file of the set with dataset.root; those with a checksum can be downloaded
     root: str | None = None  # folder of the .npy files; null: downloaded once and checked
     sampling_rate_hz: float = 60.0  # nominal rate of the source's own loader
 
     def __post_init__(self) -> None:
-        _require_known("RoboTasks9 task", self.task, ROBOTASKS9_TASKS)
+        if self.root is None:
+            _require_known("RoboTasks9 task", self.task, ROBOTASKS9_TASKS)
+        self.name = f"robotasks9/{self.task}"
         _require_positive("dataset", self, "sampling_rate_hz")
 
 
@@ -982,7 +984,7 @@ def _dataset_choices() -> dict[str, dict[str, Any]]:
     }
     return {
         "lasa": {choice: {"shapes": shapes} for choice, shapes in lasa.items()},
-        "robotasks9": {task: {"task": task} for task in ROBOTASKS9_TASKS},
+        "robotasks9": {task: {"task": task} for task in ROBOTASKS9_TASKS} | {"other": {}},
         "letters": {letter: {"letter": letter} for letter in LETTERS},
         "generated": {"jc": {"defaults": ["jc_schema", "_self_"]}},
         "panda": {

@@ -107,3 +107,9 @@ def test_a_truncated_recording_is_found(robotasks9_folder, tmp_path):
 def test_an_unknown_task_is_met_with_the_closest_one():
     with pytest.raises(UnknownName, match="Did you mean 'pouring'"):
         config("puring")
+
+
+def test_other_files_of_the_set_are_read_from_a_folder(robotasks9_folder, tmp_path):
+    (tmp_path / "navigation.npy").write_bytes((robotasks9_folder / "scoop.npy").read_bytes())
+    config = RoboTasks9Dataset(name="robotasks9/other", task="navigation", root=str(tmp_path))
+    assert read(config).name == "robotasks9/navigation"

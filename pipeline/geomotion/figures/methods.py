@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from geomotion.figures.latent import LatentMaps, draw_latent
+from geomotion.figures.latent import LatentMaps, draw_latent, legend_handles
 from geomotion.figures.style import COLOUR, SEQUENCE, new_figure, paper_style, save_figure
 
 STYLES = {
@@ -15,7 +15,7 @@ STYLES = {
     "graph_50": (SEQUENCE[5], "-"),
     "graph_100": (COLOUR["riemannian"], "-"),
     "gradient_from_line": (SEQUENCE[1], "-."),
-    "gradient_from_graph": (SEQUENCE[3], ":"),
+    "gradient_from_graph": (SEQUENCE[4], ":"),
 }
 
 
@@ -45,7 +45,7 @@ def figure_methods(curves: list[MethodCurve], maps: LatentMaps) -> Figure:
         colour, style = STYLES[curve.name]
         label = f"{curve.name.replace('_', ' ')}: length {curve.length:.2f}, {curve.seconds:.2f} s"
         ax.plot(*curve.codes.T, color=colour, linestyle=style, linewidth=1.6, label=label, zorder=5)
-    handles = ax.get_lines()[-len(curves) :]
+    handles = [*ax.get_lines()[-len(curves) :], *legend_handles(maps)]
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 

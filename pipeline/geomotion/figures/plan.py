@@ -91,6 +91,11 @@ class PlanPicture:
         return PROJECTIONS[:1] if self.demonstrations[0].position_m.shape[1] == 2 else PROJECTIONS
 
     @property
+    def runs(self) -> list[list[int]]:
+        """Numbers of legs, together where one goes on with the one before."""
+        return in_a_row([path.position_m for path in self.paths])
+
+    @property
     def orientation_dim(self) -> int:
         """Four for quaternions, three for directions."""
         return int(self.demonstrations[0].orientation.shape[1])
@@ -107,7 +112,7 @@ def draw_plan_latent(ax: Axes, picture: PlanPicture) -> Axes:
     if picture.closed is not None and picture.closed.any():
         _hatch(ax, picture.maps, picture.closed)
     _draw_legs(ax, picture.line, picture.codes)
-    _mark_ends(ax, picture.codes)
+    _mark_ends(ax, picture.codes, picture.runs)  # legs that meet in space may do so at different nodes
     return ax
 
 
@@ -120,7 +125,7 @@ def draw_positions(ax: Axes, picture: PlanPicture, plane: tuple[int, int]) -> Ax
         _thin(ax, demonstration.position_m[:, plane], number in picture.held_out)
     legs = [path.position_m[:, plane] for path in picture.paths]
     _draw_legs(ax, [path.position_m[:, plane] for path in picture.line_paths], legs)
-    _mark_ends(ax, legs)
+    _mark_ends(ax, legs, picture.runs)
     label_positions(ax, plane)
     return ax
 
@@ -132,7 +137,7 @@ def draw_directions(ax: Axes, picture: PlanPicture) -> Axes:
         _thin(ax, demonstration.orientation[:, :2], number in picture.held_out)
     legs = [path.orientation[:, :2] for path in picture.paths]
     _draw_legs(ax, [path.orientation[:, :2] for path in picture.line_paths], legs)
-    _mark_ends(ax, legs)
+    _mark_ends(ax, legs, picture.runs)
     outline_sphere(ax)
     return ax
 
@@ -144,7 +149,7 @@ def draw_component(ax: Axes, picture: PlanPicture, axis: int) -> Axes:
     Demonstrated quaternions have the sign that is nearer to the start of the path. Beside legs in a row, which may
     combine demonstrations, they are left out.
     """
-    runs = in_a_row([path.position_m for path in picture.paths])
+    runs = picture.runs
     if all(len(run) == 1 for run in runs):
         for number, demonstration in enumerate(picture.demonstrations):
             curve = _over_share(demonstration, axis) * (1, _sign(picture, demonstration))
@@ -268,9 +273,9 @@ def _draw_legs(
             ax.plot(*curve.T, **look | {"linewidth": width})
 
 
-def _mark_ends(ax: Axes, legs: Sequence[Float[np.ndarray, "_ 2"]]) -> None:
+def _mark_ends(ax: Axes, legs: Sequence[Float[np.ndarray, "_ 2"]], runs: Sequence[Sequence[int]]) -> None:
     """Start and goal of every row of legs, and where two of them meet."""
-    for run in in_a_row(legs):
+    for run in runs:
         ax.plot(*legs[run[0]][0], **START, zorder=6)
         for number in run[1:]:
             ax.plot(*legs[number][0], **VIA, zorder=6)
@@ -309,7 +314,7 @@ def _handles(picture: PlanPicture) -> list[Line2D | Patch]:
     if picture.held_out:
         handles += [Line2D([], [], color=COLOUR["demonstration"], linestyle=":", linewidth=0.9, label="held out")]
     if picture.paths:
-        has_via = len(in_a_row([path.position_m for path in picture.paths])) < len(picture.paths)
+        has_via = len(picture.runs) < len(picture.paths)
         marks = {"start": START, **({"via": VIA} if has_via else {}), "goal": GOAL}
         handles += [Line2D([], [], linestyle="", label=name, **mark) for name, mark in marks.items()]
     if picture.obstacles:

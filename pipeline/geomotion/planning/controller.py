@@ -5,24 +5,27 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from geomotion.manifolds.graph import GraphPath
 from geomotion.obstacles.motion import MovingBody
 from geomotion.planning.carrying import of_vectors, vectors
 from geomotion.planning.curve import FittedCurve
 from geomotion.planning.manifold import DecodedPath
 from geomotion.planning.obstruction import distances
-from geomotion.planning.planner import Planner, Query
+from geomotion.planning.planner import NOTHING, Planner
+from geomotion.planning.replanner import Replanner
 from geomotion.scores.paths import PosePath
 
 Pace = Callable[[float], float]
-"""Progress → how fast demonstrations are there [m/s], a radian counting as `lever_m`."""
+"""Progress → how fast to go there [m/s], a radian counting as `LEVER_M`."""
 LEVER_M = 0.1
 CAUTION = (1.0, 0.5)  # shares of the horizon, tried in turn; with less, standing still or giving way is safer
 STANDOFF = 2.0  # times the clearance: with that much room, standing still is safe enough
 ESCAPE_REACH_M = 0.15  # how far the way out is looked for
-BLEND_M = 0.04  # over which the step from one way to the next is spread
+ESCAPES, ESCAPES_APART_M = 5, 0.04  # ways out that are compared, and how far from each other they end
+ESCAPE_LOOKS = 12  # moments on a way out at which its distance to obstacles is looked at
+BLEND_M, BLEND = 0.04, 2.0  # over which the step from one way to the next is spread, and at least over twice its length
+ARRIVED = 1e-6  # difference of positions [m] and orientations to the goal
 
 
 @dataclass(frozen=True)
@@ -37,148 +40,194 @@ class ControllerSettings:
     """
 
     period_s: float
-    look_every: int = 2
+    look_every: int = 4
     replan_every_s: float = 0.5
     escape_m_per_s: float = 0.4
+
+
+class Following:
+    """A curve that is being followed, entered from a pose beside it without a jump.
+
+    Args:
+        curve: To follow, from where it is nearest.
+        pose: Where the robot is, shape (1,).
+        code: The latent point of that pose.
+    """
+
+    def __init__(self, curve: FittedCurve, pose: PosePath, code: Float[np.ndarray, " d"]) -> None:
+        self.curve = curve
+        self._poses = vectors(curve.path.poses)
+        self._position_dim = dim = pose.position_m.shape[1]
+        self._behind_m = np.concatenate([[0.0], np.cumsum(steps_m(curve.path.poses))])
+        self._at_m = float(self._behind_m[np.linalg.norm(curve.codes - code, axis=1).argmin()])
+        self._gone_m = 0.0
+        self._aside = vectors(pose)[0] - self._values(self._poses, np.array([self._at_m]))[0]
+        aside_m = np.hypot(*(np.linalg.norm(part) for part in (self._aside[:dim], 2 * LEVER_M * self._aside[dim:])))
+        self._blend_m = max(BLEND_M, BLEND * aside_m)
+
+    def go(self, way_m: float) -> None:
+        """Move on along the curve, no farther than to its end."""
+        self._gone_m += way_m
+        self._at_m = min(self._at_m + way_m, float(self._behind_m[-1]))
+
+    @property
+    def pose(self) -> PosePath:
+        """Where the robot should be, shape (1,)."""
+        return self._followed(np.array([self._at_m]))
+
+    @property
+    def code(self) -> Float[np.ndarray, " d"]:
+        """Its latent point."""
+        return np.asarray(self._values(self.curve.codes, np.array([self._at_m]))[0])
+
+    @property
+    def progress(self) -> float:
+        """Share of the demonstrated motion that is done there."""
+        return float(np.interp(self._at_m, self._behind_m, self.curve.path.progress))
+
+    @property
+    def ahead(self) -> FittedCurve:
+        """What is still to be followed, from here on."""
+        way_m = np.concatenate([[self._at_m], self._behind_m[self._behind_m > self._at_m]])
+        progress = np.interp(way_m, self._behind_m, self.curve.path.progress)
+        return replace(self.curve, path=DecodedPath(self._followed(way_m), progress))
+
+    def _followed(self, at_m: Float[np.ndarray, " place"]) -> PosePath:
+        fading = (1 - (self._gone_m + at_m - self._at_m) / self._blend_m).clip(min=0)
+        return of_vectors(self._values(self._poses, at_m) + fading[:, None] * self._aside, self._position_dim)
+
+    def _values(
+        self, along: Float[np.ndarray, "point k"], at_m: Float[np.ndarray, " place"]
+    ) -> Float[np.ndarray, "place k"]:
+        return np.stack([np.interp(at_m, self._behind_m, axis) for axis in along.T], axis=1)
 
 
 class GeodesicController:
     """The next pose, each time it is asked, among obstacles that move.
 
     Each plan keeps its clearance to everywhere the obstacles get to within the planner's horizon. Where no such path
-    exists, less foresight is tried; where there is none at all, the controller stands still if there
-    is room, and otherwise goes where there is most.
+    exists, less foresight is tried; where there is none at all, the controller stands still if there is room, and
+    otherwise takes the way out that stays farthest from the obstacles, each looked at when the robot gets there.
 
     Args:
         planner: Plans on the decoded graph; its constraint says clearance and horizon.
-        query: Start and goal.
+        start: Where the motion begins.
+        goal: Where it ends.
         pace: How fast to go.
         settings: How to move.
     """
 
-    def __init__(self, planner: Planner, query: Query, pace: Pace, settings: ControllerSettings) -> None:
-        self.planner, self.query, self.pace, self.settings = planner, query, pace, settings
-        self._planners = [_looking_ahead(planner, share) for share in CAUTION]
-        self.pose = query.ends[:1]
-        self.code = planner.surface.grid.nodes[query.start]
+    def __init__(
+        self, planner: Planner, start: PosePath, goal: PosePath, pace: Pace, settings: ControllerSettings
+    ) -> None:
+        self.planner, self.pace, self.settings = planner, pace, settings
+        self._replanners = [Replanner(_looking_ahead(planner, share), start, goal) for share in CAUTION]
+        self.query = self._replanners[0].query
+        for replanner in self._replanners[1:]:
+            replanner.query = self.query  # one for all: the graph takes up another one in milliseconds
+        self._carried = vectors(self.query.poses)
+        self.pose = self.query.ends[:1]
+        self.code = planner.surface.grid.nodes[self.query.start]
         self.plans = 0
         self.waited_s = 0.0
-        self._curve: FittedCurve | None = None
-        self._lengths = np.zeros(1)
-        self._at_m, self._steps, self._escapes = 0.0, 0, False
-        self._planned_s = -np.inf
-        self._step_aside = np.zeros(vectors(self.pose).shape[1])
-        self._blended_m = 0.0
-        self._last: GraphPath | None = None
+        self._way: Following | None = None
+        self._escapes = False
+        self._steps, self._planned_s = 0, -np.inf
 
     @property
     def arrived(self) -> bool:
-        """Whether the goal is reached."""
-        return bool(self._curve is not None and not self._escapes and self._at_m >= self._lengths[-1])
+        """Whether the robot is at the goal."""
+        return bool(np.abs(vectors(self.pose) - vectors(self.query.ends[-1:])).max() < ARRIVED)
 
     def step(self, time_s: float, bodies: Sequence[MovingBody]) -> PosePath:
         """The pose to be at one period later, shape (1,)."""
         if self._steps % self.settings.look_every == 0 and not self._can_go_on(time_s, bodies):
             self._replan(time_s, bodies)
         self._steps += 1
-        if self._curve is None:
-            self.waited_s += self.settings.period_s
+        if self._way is None:
+            self.waited_s += 0.0 if self.arrived else self.settings.period_s
             return self.pose
-        speed = self.settings.escape_m_per_s if self._escapes else self.pace(self._progress())
-        self._blended_m += speed * self.settings.period_s
-        self._at_m = min(self._at_m + speed * self.settings.period_s, float(self._lengths[-1]))
-        self._move()
+        pace = self.settings.escape_m_per_s if self._escapes else self.pace(self._way.progress)
+        self._way.go(pace * self.settings.period_s)
+        self.pose, self.code = self._way.pose, self._way.code
         return self.pose
-
-    def _replan(self, time_s: float, bodies: Sequence[MovingBody]) -> None:
-        here = int(self.planner.surface.grid.nearest(self.code[None])[0])
-        self._planned_s = time_s
-        query = self._query_from(here)
-        self.plans += 1
-        for planner in self._planners:
-            route = planner.route(query, bodies, time_s, self._last)
-            if route is not None:
-                self._last = route.found
-                self._take(route.curve, escapes=False)
-                return
-        self._last = None
-        room = self._room(time_s, bodies, np.array([here]))[0]
-        if room >= STANDOFF * self.planner.settings.constraint.clearance_m:
-            self._curve = None
-            return
-        self._escape(query, time_s, bodies)
-
-    def _escape(self, query: Query, time_s: float, bodies: Sequence[MovingBody]) -> None:
-        """Follow the shortest way, whatever is there, to the node in reach that stays farthest from all obstacles."""
-        points = query.poses.position_m
-        near = np.flatnonzero(query.is_open & (np.linalg.norm(points - points[query.start], axis=1) < ESCAPE_REACH_M))
-        room = self._room(time_s, bodies, near)
-        self.planner.graph.feel(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
-        for target in near[np.argsort(-room)][:5]:
-            found = self.planner.graph.shortest_path(query.start, int(target))
-            if found.exists and len(found.nodes) > 1:
-                ends = PosePath(
-                    np.concatenate([self.pose.position_m, points[[target]]]),
-                    np.concatenate([self.pose.orientation, query.poses.orientation[[target]]]),
-                )
-                away = replace(query, goal=int(target), ends=ends)
-                self._take(self.planner.fit(away, found), escapes=True)
-                return
-        self._curve = None
-
-    def _room(self, time_s: float, bodies: Sequence[MovingBody], nodes: np.ndarray) -> Float[np.ndarray, " node"]:
-        """Smallest distance to obstacles over the horizon [m]."""
-        if not bodies:
-            return np.full(len(nodes), np.inf)
-        tool, horizon_s = self.planner.settings.tool, self.planner.settings.constraint.horizon_s
-        return np.asarray(distances(bodies, self.query.points_m[nodes], tool.radii_m, time_s, horizon_s).min(axis=0))
 
     def _can_go_on(self, time_s: float, bodies: Sequence[MovingBody]) -> bool:
         """Whether the rest of the way is still free, and fresh or at its end."""
-        if self._curve is None or self._escapes:
+        if self._way is None or self._escapes:
             return False
         if time_s - self._planned_s > self.settings.replan_every_s and not self.arrived:
             return False
-        ahead = int(np.searchsorted(self._lengths, self._at_m, side="right")) - 1
-        rest = replace(self._curve, path=DecodedPath(self._curve.path.poses[ahead:], self._curve.path.progress[ahead:]))
         wanted = self.planner.settings.constraint.clearance_m
-        return self.planner.clearance(self.query, rest, bodies, time_s) >= wanted
+        return self.planner.clearance(self.query, self._way.ahead, bodies, time_s) >= wanted
 
-    def _query_from(self, node: int) -> Query:
-        query = self.query
-        ends = PosePath(
-            np.concatenate([self.pose.position_m, query.ends.position_m[1:]]),
-            np.concatenate([self.pose.orientation, query.ends.orientation[1:]]),
-        )
-        return replace(query, start=node, ends=ends)
+    def _replan(self, time_s: float, bodies: Sequence[MovingBody]) -> None:
+        here = self._replanners[0].node_at(self.code)
+        self.plans, self._planned_s, self._escapes = self.plans + 1, time_s, False
+        for replanner in self._replanners:
+            curve = replanner.replan(bodies, time_s, here, self._pose_near(here))
+            if curve is not None:
+                self._way = Following(curve, self.pose, self.code)
+                return
+        self._way = None
+        room_m = self._room_m(self.planner.settings.tool.points(self.pose), time_s, bodies)[0]
+        if room_m < STANDOFF * self.planner.settings.constraint.clearance_m:
+            self._give_way(here, float(room_m), time_s, bodies)
 
-    def _take(self, curve: FittedCurve, escapes: bool) -> None:
-        """Go on along a curve, from where it is nearest."""
-        self._curve, self._escapes = curve, escapes
-        poses = curve.path.poses
-        turns = 2 * np.linalg.norm(np.diff(poses.orientation, axis=0), axis=1)
-        steps = np.hypot(np.linalg.norm(np.diff(poses.position_m, axis=0), axis=1), LEVER_M * turns)
-        self._lengths = np.concatenate([[0.0], np.cumsum(steps)])
-        self._at_m = float(self._lengths[np.linalg.norm(curve.codes - self.code, axis=1).argmin()])
-        self._step_aside, self._blended_m = vectors(self.pose)[0] - self._on_curve()[0], 0.0
+    def _give_way(self, here: int, room_m: float, time_s: float, bodies: Sequence[MovingBody]) -> None:
+        """Follow the way out with most room, obstacles looked at when the robot gets there; none: stand still."""
+        self.planner.graph.feel(*NOTHING)
+        for target, room_there_m in self._refuges(here, time_s, bodies):
+            found = self.planner.graph.shortest_path(here, target)
+            if not found.exists:
+                continue
+            there = PosePath(*(part[[target]] for part in vars(self.query.poses).values()))
+            away = self.planner.onward(replace(self.query, goal=target, ends=there), here, self._pose_near(here))
+            way = Following(self.planner.fit(away, found), self.pose, self.code)
+            kept_m = min(room_there_m, self._room_on_the_way_m(way, time_s, bodies))
+            if kept_m > room_m:
+                self._way, self._escapes, room_m = way, True, kept_m
 
-    def _progress(self) -> float:
-        assert self._curve is not None
-        return float(np.interp(self._at_m, self._lengths, self._curve.path.progress))
+    def _pose_near(self, node: int) -> PosePath:
+        """What the pose would be at a node close by, where a plan begins, as far from the manifold as it is here."""
+        here = self.planner.surface.grid.interpolate(self._carried, self.code[None])
+        return of_vectors(vectors(self.pose) + self._carried[[node]] - here, self.pose.position_m.shape[1])
 
-    def _move(self) -> None:
-        assert self._curve is not None
-        fading = max(0.0, 1 - self._blended_m / BLEND_M)
-        moved = self._on_curve() + fading * self._step_aside
-        self.pose = of_vectors(moved, self.query.ends.position_m.shape[1])
-        self.code = self._along(self._curve.codes)[0]
+    def _refuges(self, here: int, time_s: float, bodies: Sequence[MovingBody]) -> list[tuple[int, float]]:
+        """Nodes in reach, apart from each other, where most room remains, with that room [m]."""
+        positions_m = self.query.poses.position_m
+        reach_m = np.linalg.norm(positions_m - positions_m[here], axis=1)
+        near: Int[np.ndarray, " node"] = np.flatnonzero(self.query.is_open & (reach_m < ESCAPE_REACH_M))
+        room_m = self._room_m(self.query.points_m[near], time_s, bodies)
+        found: list[tuple[int, float]] = []
+        while len(near) > 0 and len(found) < ESCAPES:
+            best = int(room_m.argmax())
+            found.append((int(near[best]), float(room_m[best])))
+            apart = np.linalg.norm(positions_m[near] - positions_m[near[best]], axis=1) > ESCAPES_APART_M
+            near, room_m = near[apart], room_m[apart]
+        return found
 
-    def _on_curve(self) -> Float[np.ndarray, "1 D"]:
-        assert self._curve is not None
-        return self._along(vectors(self._curve.path.poses))
+    def _room_m(
+        self, points_m: Float[np.ndarray, "pose ball Dx"], time_s: float, bodies: Sequence[MovingBody]
+    ) -> Float[np.ndarray, " pose"]:
+        """Smallest distance to obstacles over the horizon [m]."""
+        settings = self.planner.settings
+        apart = distances(bodies, points_m, settings.tool.radii_m, time_s, settings.constraint.horizon_s)
+        return np.asarray(apart.min(axis=0))
 
-    def _along(self, values: Float[np.ndarray, "point k"]) -> Float[np.ndarray, "1 k"]:
-        return np.array([[np.interp(self._at_m, self._lengths, axis) for axis in values.T]])
+    def _room_on_the_way_m(self, way: Following, time_s: float, bodies: Sequence[MovingBody]) -> float:
+        """Smallest distance to obstacles while the robot gets to the end of a way [m]."""
+        poses, tool = way.ahead.path.poses.resampled(ESCAPE_LOOKS), self.planner.settings.tool
+        times_s = time_s + np.concatenate([[0.0], np.cumsum(steps_m(poses))]) / self.settings.escape_m_per_s
+        points_m = tool.points(poses)[:, None]
+        looks = zip(points_m, times_s.tolist(), strict=True)
+        return float(min(distances(bodies, one, tool.radii_m, at_s).min() for one, at_s in looks))
+
+
+def steps_m(poses: PosePath) -> Float[np.ndarray, " step"]:
+    """Lengths of the steps between poses with quaternions [m], a radian counting as `LEVER_M`."""
+    turned_rad = 2 * np.linalg.norm(np.diff(poses.orientation, axis=0), axis=1)
+    return np.asarray(np.hypot(np.linalg.norm(np.diff(poses.position_m, axis=0), axis=1), LEVER_M * turned_rad))
 
 
 def _looking_ahead(planner: Planner, share: float) -> Planner:

@@ -48,6 +48,7 @@ def closed_loop(
     frame: panda.Frame = "grasp_target",
     motions: Motions = AT_REST,
     film: Film | None = None,
+    has_ended: Callable[[], bool] = lambda: False,
 ) -> ClosedLoop:
     """Let a controller lead a frame of the arm, within the joints' limits of velocity and acceleration.
 
@@ -57,11 +58,12 @@ def closed_loop(
         scene: Its arm is put at the start.
         controller: Time [s] and measured pose (m, wxyz) -> the pose to be at one period later.
         start_rad: [rad].
-        duration_s: How long [s].
+        duration_s: How long [s], at most.
         control_hz: How often the controller is asked [Hz]; divides 240.
         frame: The frame that it leads.
         motions: Obstacle -> function of the time [s] that gives its offset from its place [m]; the others rest.
         film: Takes pictures, if given.
+        has_ended: Asked after each period: whether it was the last one.
 
     Raises:
         InvalidSetting: If `control_hz` does not divide 240, the duration is shorter than a period, or the controller
@@ -89,6 +91,8 @@ def closed_loop(
             joints = joints + velocity / RATE_HZ
             scene.step()
             recorder.note(time_s + step / RATE_HZ, joints)
+        if has_ended():
+            break
     times, positions, orientations = (np.array(column) for column in zip(*asked, strict=True))
     return ClosedLoop(recorder.tracking(), times, positions, orientations, tuple(unreachable))
 

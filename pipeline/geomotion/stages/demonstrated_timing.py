@@ -6,7 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 SAMPLES = 60
-LEAST = 1e-3  # share of the mean pace: a path never stands still between its ends
+LEAST = 1e-3  # share of the time that is spread evenly over a path: none of it is passed in no time
+SLOWEST = 0.05  # of the mean pace: demonstrations that rest do not stop a path for ever
+SHORTEST = 0.5  # of the motion: less of it is passed at constant pace
 
 
 def share_of_path_at_time(
@@ -19,13 +21,12 @@ def share_of_path_at_time(
         progress: Along the path, which may begin or end in the middle of the motion, or go backwards.
     """
     wanted = np.linspace(0, 1, SAMPLES)
-    shares = [np.interp(wanted, np.linspace(0, 1, len(one)), one) for one in demonstrated]
-    pace = np.gradient(np.mean(shares, axis=0), wanted)
     along = np.abs(np.diff(progress))
-    if along.sum() < 0.5:  # little of the motion: at constant pace
+    if along.sum() < SHORTEST:
         return wanted
-    at = np.interp((progress[1:] + progress[:-1]) / 2, np.mean(shares, axis=0), pace)
-    spans = along / np.maximum(at, 0.05) + LEAST / len(along)
+    mean = np.mean([np.interp(wanted, np.linspace(0, 1, len(one)), one) for one in demonstrated], axis=0)
+    pace = np.interp((progress[1:] + progress[:-1]) / 2, mean, np.gradient(mean, wanted))
+    spans = along / np.maximum(pace, SLOWEST) + LEAST / len(along)
     passed = np.concatenate([[0.0], np.cumsum(spans)])
     passed /= passed[-1]
     found = np.interp(wanted, passed, np.linspace(0, 1, len(progress)))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from geomotion.scores.paths import (
     PoseDistance,
     PosePath,
     dimensionless_jerk,
-    dtwd_ratio,
     mean_path_with_blended_ends,
     pose_dtwd,
     turning_rad,
@@ -34,6 +34,8 @@ from geomotion.tracking import Artefacts, StageRun
 __all__ = ["EvaluateGeodesicsConfig", "evaluate_geodesics", "scores_table"]
 
 MM = 1000.0
+PARTS = ("position", "orientation")
+ALIKE_M, ALIKE_RAD = 1e-4, 1e-3  # demonstrations that differ less set no measure
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Judged:
         plan: From its first to its last pose.
         averaged: Mean of the training demonstrations, brought to its ends.
         line: Decoded straight latent line, brought to its ends; None without a plan.
-        others: Training demonstrations other than itself.
+        others: Training demonstrations other than itself; itself, where it is the only one.
     """
 
     number: int
@@ -71,9 +73,21 @@ class Judged:
         """The planned path."""
         return None if self.plan.path is None else self.plan.path.poses
 
+    @cached_property
+    def unlike_others(self) -> PoseDistance:
+        """Mean DTWD between this demonstration and the others [m, rad]; not a number where they are alike."""
+        apart = [pose_dtwd(self.demonstration, other) for other in self.others]
+        position, orientation = np.mean([(one.position, one.orientation) for one in apart], axis=0).tolist()
+        return PoseDistance(
+            position if position > ALIKE_M else np.nan, orientation if orientation > ALIKE_RAD else np.nan
+        )
+
     def ratio(self, path: PosePath) -> PoseDistance:
         """DTWD of a path, over the mean DTWD between this demonstration and the others."""
-        return dtwd_ratio(path, self.demonstration, self.others)
+        own = pose_dtwd(path, self.demonstration)
+        return PoseDistance(
+            own.position / self.unlike_others.position, own.orientation / self.unlike_others.orientation
+        )
 
 
 def evaluate_geodesics(config: EvaluateGeodesicsConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
@@ -138,6 +152,11 @@ def score(planner: Planner, judged: Sequence[Judged], subset: str) -> Evaluation
     omitted = {f"{subset}.demonstration {one.number}": one.plan.reason for one in judged if one.geodesic is None}
     if planned:
         scores |= _reproduction(planned) | _support(planner, planned) | _geometry(planned)
+        omitted |= {
+            f"{subset}.{part}_dtwd_ratio": f"the demonstrations do not differ in {part}"
+            for part in PARTS
+            if f"{part}_dtwd_ratio" not in scores
+        }
     arrays = {}
     for one in planned:
         for name, path in (("demo", one.demonstration), ("geodesic", one.geodesic), ("averaged", one.averaged)):
@@ -181,8 +200,10 @@ def _reproduction(planned: Sequence[Judged]) -> dict[str, Score]:
     }
     for suffix, (paths, note) in kinds.items():
         ratios = [one.ratio(path) for one, path in zip(planned, paths, strict=True) if path is not None]
-        scores[f"position_dtwd_ratio{suffix}"] = mean_score([one.position for one in ratios], "1", note)
-        scores[f"orientation_dtwd_ratio{suffix}"] = mean_score([one.orientation for one in ratios], "1", note)
+        for part in PARTS:
+            values = [value for one in ratios if np.isfinite(value := getattr(one, part))]
+            if values:
+                scores[f"{part}_dtwd_ratio{suffix}"] = mean_score(values, "1", note)
     return scores
 
 
@@ -239,9 +260,9 @@ def _geometry(planned: Sequence[Judged]) -> dict[str, Score]:
 
 
 def _comrades(skilled: Skilled, groups: tuple[str, ...], number: int) -> list[int]:
-    """Training demonstrations of the same group; all of them, where it has none."""
+    """Other training demonstrations of the same group; of all groups, where it has none; itself, if it is alone."""
     own = [one for one in skilled.skill.train_demos if groups[one] == groups[number] and one != number]
-    return own or [one for one in skilled.skill.train_demos if one != number]
+    return own or [one for one in skilled.skill.train_demos if one != number] or [number]
 
 
 def _drawn(one: Judged) -> JudgedGeodesic:

@@ -1,10 +1,15 @@
 """The verbs of `gms` as chains of stages."""
 
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
 from geomotion.config import DatasetConfig, GmsConfig
 from geomotion.files import read_json
-from geomotion.stages import compare, shared
+from geomotion.manifolds.grid import require_memory
+from geomotion.stages import compare, scene, shared
 from geomotion.stages.evaluate_geodesics import EvaluateGeodesicsConfig, evaluate_geodesics, scores_table
-from geomotion.stages.graph import GraphStageConfig, graph, graph_table
+from geomotion.stages.graph import GraphStageConfig, graph, graph_table, memory_limit_bytes
 from geomotion.stages.ingest import ingest
 from geomotion.stages.plan import PlanStageConfig, plan, plan_table
 from geomotion.stages.replay import ReplayStageConfig, replay, replay_table
@@ -26,9 +31,16 @@ def _graph_config(session: Session) -> GraphStageConfig:
     return GraphStageConfig(session.config.graph, session.config.metric)
 
 
+def _require_graph_fits(config: GmsConfig) -> None:
+    require_memory(config.graph.points_per_axis, config.manifold.latent_dim, memory_limit_bytes(config.graph))
+
+
 def _plan_config(session: Session) -> PlanStageConfig:
     config: GmsConfig = session.config
-    return PlanStageConfig(config.planning, config.metric, config.obstacle, config.robot.frame)
+    # what is in files decides whether a plan is repeated, as everything in the configuration does
+    found = [path for path in scene.files(config.obstacle) if path.is_file()]
+    digests = {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in found}
+    return PlanStageConfig(config.planning, config.metric, config.obstacle, config.robot.frame, digests)
 
 
 def _evaluate_config(session: Session) -> EvaluateGeodesicsConfig:
@@ -51,7 +63,7 @@ STEPS = {
     "ingest": Step(Stage("ingest", ingest, reads_outside=True), (), lambda session: session.config.dataset),
     "train": Step(Stage("train", train_manifold), ("ingest",), _train_config),
     "graph": Step(Stage("graph", graph), ("ingest", "train"), _graph_config),
-    "plan": Step(Stage("plan", plan, reads_outside=True), SKILL, _plan_config),
+    "plan": Step(Stage("plan", plan), SKILL, _plan_config),
     "evaluate": Step(Stage("evaluate", evaluate_geodesics), SKILL, _evaluate_config),
     "replay": Step(Stage("replay", replay), (*SKILL, "plan"), _replay_config),
     "report": Step(Stage("report", report_gms), (*REPORTED, "replay"), _report_config),
@@ -99,7 +111,12 @@ def _replay(session: Session) -> VerbResult:
     document = read_json(found.path("replay.json"))
     film = found.folder / "film.gif"
     text = replay_table(document) + (f"\n\nfilm  {film}" if film.exists() else "")
-    return VerbResult(text, session.document(replay=document), exit_code=0 if document["executed"] else NO_PATH)
+    return VerbResult(text, session.document(replay=document), exit_code=0 if _is_executed(document) else NO_PATH)
+
+
+def _is_executed(replay: Mapping[str, Any]) -> bool:
+    """Whether the arm took every pose, and arrived where it had to find its way."""
+    return replay["executed"] and not replay["unreachable"] and replay["reached_goal"] is not False
 
 
 def _report(session: Session) -> VerbResult:
@@ -114,14 +131,16 @@ def _run(session: Session) -> VerbResult:
     evaluated, reported = _evaluate(session), _report(session)
     lines = [plan_table(planned), "", evaluated.text]
     document = evaluated.document | {"plan": planned} | reported.document
+    succeeded = planned["found"]
     if "replay" in session.done:
         document["replay"] = read_json(session.done["replay"].path("replay.json"))
+        succeeded = _is_executed(document["replay"])
         lines += ["", replay_table(document["replay"])]
     text = "\n".join([*lines, "", reported.text])
-    return VerbResult(text, document, exit_code=0 if planned["found"] else NO_PATH, objective=evaluated.objective)
+    return VerbResult(text, document, exit_code=0 if succeeded else NO_PATH, objective=evaluated.objective)
 
 
-NO_PATH = 3  # an answer, not a mistake: scripts can tell it from both
+NO_PATH = 3  # no path, or one that the arm cannot take: an answer, not a mistake; scripts can tell it from both
 
 GMS = Program(
     name="gms",
@@ -139,4 +158,5 @@ GMS = Program(
         "check": shared.check_verb,
     },
     execution_keys=shared.EXECUTION_KEYS | {"metric", "graph", "planning", "robot"},
+    check=_require_graph_fits,
 )

@@ -25,6 +25,8 @@ from geomotion.tables import aligned
 from geomotion.tracking import Artefacts, StageRun
 
 CROSSING = 10.0  # times the longest demonstration's length: a path that long crosses a region without data
+LEAST_CAP_SHARE = 0.05  # of the size of the data: demonstrations may be more alike than a manifold is exact
+LEAST_CAP_RAD = float(np.radians(5))
 END_ROOM = 3.0  # times how far demonstrations are from each other: how far start and goal may be from them
 MAP_POINTS = 4000  # at most, in one batch of Jacobians
 
@@ -67,8 +69,7 @@ def graph(config: GraphStageConfig, inputs: Mapping[str, Artefacts], run: StageR
         TooLargeForMemory: If the grid would not fit; before anything is allocated.
     """
     skill = manifold_models.load(inputs["train"].path("model.pt"))
-    limit = int(config.graph.memory_limit_gib * 2**30)
-    require_memory(config.graph.points_per_axis, skill.config.latent_dim, limit)
+    require_memory(config.graph.points_per_axis, skill.config.latent_dim, memory_limit_bytes(config.graph))
     demonstrations = storage.load(inputs["ingest"].folder)
     manifold = PoseManifold(skill, training_set(demonstrations, skill.train_demos, skill.config), config.metric)
     begun = time.perf_counter()
@@ -76,8 +77,8 @@ def graph(config: GraphStageConfig, inputs: Mapping[str, Artefacts], run: StageR
     surface = Surface.of(manifold, grid, PoseSupport.of(_both_signs(manifold)))
     seconds = time.perf_counter() - begun
     _save(surface, run)
-    cap_m, cap_rad = _cap(manifold.data.paths)
-    end_cap_m, end_cap_rad = _cap(manifold.data.originals)
+    cap_m, cap_rad = _cap(manifold.data.paths, manifold.scale_m)
+    end_cap_m, end_cap_rad = _cap(manifold.data.originals, manifold.scale_m)
     lengths = [float(np.sqrt(energy(manifold, codes.numpy()))) for codes in manifold.codes]
     document = {
         "points_per_axis": grid.points_per_axis,
@@ -102,6 +103,11 @@ def graph(config: GraphStageConfig, inputs: Mapping[str, Artefacts], run: StageR
         save_latent_figure(
             latent_maps(manifold, surface, (log_std, log_volume), cap_m, cap_rad), run.folder / "figures"
         )
+
+
+def memory_limit_bytes(config: GraphConfig) -> int:
+    """How much memory a graph may take."""
+    return int(config.memory_limit_gib * 2**30)
 
 
 def graph_table(document: Mapping[str, Any]) -> str:
@@ -157,12 +163,14 @@ def _save(surface: Surface, run: StageRun) -> None:
         np.savez_compressed(temporary, allow_pickle=False, **arrays)
 
 
-def _cap(paths: Sequence[PosePath]) -> tuple[float, float]:
-    """How far demonstrations, each held out in turn, go from all the others: the farthest of them."""
-    if len(paths) < 2:
-        return float(np.linalg.norm(np.diff(paths[0].position_m, axis=0), axis=1).max()), float(np.radians(5))
-    apart_m, apart_rad = leave_one_out(paths)
-    return float(apart_m.max()), float(apart_rad.max())
+def _cap(paths: Sequence[PosePath], scale_m: float) -> tuple[float, float]:
+    """How far demonstrations, each held out in turn, go from all the others: the farthest of them.
+
+    Demonstrations that hardly differ, in orientation for example, would leave no room for what learning misses.
+    """
+    steps_m = max(float(np.linalg.norm(np.diff(path.position_m, axis=0), axis=1).max()) for path in paths)
+    apart_m, apart_rad = leave_one_out(paths) if len(paths) > 1 else (np.zeros(1), np.zeros(1))
+    return max(float(apart_m.max()), steps_m, LEAST_CAP_SHARE * scale_m), max(float(apart_rad.max()), LEAST_CAP_RAD)
 
 
 def _both_signs(manifold: PoseManifold) -> list[PosePath]:

@@ -1,7 +1,7 @@
 """Plan a motion between two poses, through others, around obstacles."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +15,7 @@ from geomotion.figures.plan import ObstacleShape, PlanPicture, save_plan_figure
 from geomotion.figures.scene3d import save_scene
 from geomotion.files import atomic, write_json
 from geomotion.obstacles.motion import MovingBody
-from geomotion.planning.plan import Plan
+from geomotion.planning.plan import Plan, PlanStatus
 from geomotion.planning.planner import Planner, Query
 from geomotion.scores.paths import PosePath
 from geomotion.stages import planners
@@ -30,12 +30,21 @@ WAY_POINTS = 9  # of a moving obstacle, in pictures
 
 @dataclass(frozen=True)
 class PlanStageConfig:
-    """What the plan stage needs."""
+    """What the plan stage needs.
+
+    Attributes:
+        planning: Start, goal and how to get there.
+        metric: In which lengths are taken.
+        obstacle: What stands in the way.
+        frame: Which frame of the arm the poses are of.
+        file_digests: SHA-256 of the contents of each file that obstacles are read from.
+    """
 
     planning: PlanningConfig
     metric: MetricConfig
     obstacle: ObstacleConfig
     frame: EndEffectorFrame
+    file_digests: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -64,7 +73,7 @@ def plan(config: PlanStageConfig, inputs: Mapping[str, Artefacts], run: StageRun
     skilled = load_skilled(inputs, config.metric)
     demonstrations = storage.load(inputs["ingest"].folder)
     planned = make_plans(config, skilled, demonstrations)
-    write_json(run.folder / "plan.json", _document(planned))
+    write_json(run.folder / "plan.json", _document(planned) | {"obstacle_files": dict(config.file_digests)})
     if planned.found:
         with atomic(run.folder / "path.npz") as temporary:
             np.savez_compressed(temporary, allow_pickle=False, **_arrays(planned))
@@ -81,12 +90,23 @@ def make_plans(config: PlanStageConfig, skilled: Skilled, demonstrations: Demons
     queries, plans = [], []
     for start, goal in pairwise(places):  # one after the other: a query sets the graph up
         queries.append(planner.query(start.pose, goal.pose, (start.code, goal.code)))
-        plans.append(planner.plan(queries[-1], bodies))
+        plans.append(plan_leg(planner, queries[-1], bodies))
     others = []
     for start, goal in planners.other_pairs(config.planning, skilled, demonstrations, planner):
         query = planner.query(start.pose, goal.pose, (start.code, goal.code))
-        others.append((start, goal, planner.plan(query, bodies)))
+        others.append((start, goal, plan_leg(planner, query, bodies)))
     return Planned(planner, places, queries, plans, bodies, others)
+
+
+def plan_leg(planner: Planner, query: Query, bodies: list[MovingBody]) -> Plan:
+    """A plan; obstacles that leave no way but across a region without data block it, and are named."""
+    found = planner.plan(query, bodies)
+    if found.status is not PlanStatus.crosses or not bodies or not planner.plan(query).found:
+        return found
+    alone = [body.name for body in bodies if planner.plan(query, [one for one in bodies if one is not body]).found]
+    names = tuple(alone or planners.names(bodies))
+    reason = f"{PlanStatus.blocked.value}: {', '.join(names)}; of what they leave open, {found.reason}"
+    return replace(found, status=PlanStatus.blocked, reason=reason, blocking=names)
 
 
 def plan_table(document: Mapping[str, Any]) -> str:

@@ -1,102 +1,122 @@
-"""Replanning in closed loop: the simulated arm follows a controller that sees the obstacles move."""
+"""Replanning in closed loop: controllers that see the obstacles move lead the simulated arm from stop to stop."""
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
 
-from geomotion.config import ToolShape
+from geomotion.config import PlanningConfig, RobotConfig, ToolShape
 from geomotion.demos.demonstrations import Demonstrations
 from geomotion.obstacles.motion import MovingBody
-from geomotion.planning.controller import LEVER_M, ControllerSettings, GeodesicController, Pace
-from geomotion.robot import panda
-from geomotion.robot.closed_loop import ClosedLoop, closed_loop
-from geomotion.robot.film import Film
-from geomotion.robot.inverse_kinematics import JointPath
-from geomotion.robot.scene import PandaScene
-from geomotion.robot.timed import TimedJoints
+from geomotion.planning.controller import ControllerSettings, GeodesicController, Pace, steps_m
 from geomotion.scores.paths import PosePath
 from geomotion.stages import planners
 from geomotion.stages.graph import Skilled
 
-if TYPE_CHECKING:
-    from geomotion.stages.replay import ReplayStageConfig
-
-PATIENCE = 4.0  # times the planned duration, after which a goal that is not reached is given up
 SLOWEST = 0.25  # of the mean pace: demonstrations begin and end at rest, where a motion would never leave
+SETTLED_S = 0.5  # at the goal, after which a motion has ended
 
 
-@dataclass(frozen=True)
-class Replanned:
-    """What replanning did.
+@dataclass
+class Pilot:
+    """Hands the poses of controllers to a control loop, one leg after the other.
 
     Attributes:
-        loop: What the arm did.
+        controllers: One for each leg, each beginning where the one before ends.
         bodies: Obstacles.
         seconds: Computing time of each step that planned [s].
-        waited_s: How long there was no way on [s].
-        reached_goal: Whether the motion arrived.
     """
 
-    loop: ClosedLoop
+    controllers: Sequence[GeodesicController]
     bodies: Sequence[MovingBody]
-    seconds: list[float]
-    waited_s: float
-    reached_goal: bool
+    seconds: list[float] = field(default_factory=list)
+    _leg: int = 0
+    _settled_s: float = 0.0
+
+    def __call__(
+        self, time_s: float, position_m: Float[np.ndarray, "3"], orientation_wxyz: Float[np.ndarray, "4"]
+    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4"]]:
+        """The pose to be at one period later [m, wxyz]; where the arm is makes no difference."""
+        if self.controllers[self._leg].arrived and self._leg < len(self.controllers) - 1:
+            self._leg += 1
+        controller = self.controllers[self._leg]
+        before, begun = controller.plans, time.perf_counter()
+        pose = controller.step(time_s, self.bodies)
+        if controller.plans > before:
+            self.seconds.append(time.perf_counter() - begun)
+        self._settled_s = self._settled_s + controller.settings.period_s if self.reached_goal else 0.0
+        return pose.position_m[0], pose.orientation[0]
+
+    @property
+    def reached_goal(self) -> bool:
+        """Whether the last leg has ended."""
+        return self.controllers[-1].arrived
+
+    @property
+    def waited_s(self) -> float:
+        """How long there was no way on [s]."""
+        return sum(controller.waited_s for controller in self.controllers)
+
+    def has_ended(self) -> bool:
+        """Whether the motion has been at its goal for a while."""
+        return self._settled_s >= SETTLED_S
 
 
-def replay_closed_loop(
-    scene: PandaScene,
-    config: "ReplayStageConfig",
+def make_pilot(
+    robot: RobotConfig,
+    planning: PlanningConfig,
     skilled: Skilled,
     demonstrations: Demonstrations,
-    path: PosePath,
-    progress: Float[np.ndarray, " point"],
+    stops: PosePath,
     bodies: Sequence[MovingBody],
-    joints: JointPath,
-    timed: TimedJoints,
-    film: Film | None,
-) -> Replanned:
-    """Follow the manifold from the first to the last pose of a path, looking at the obstacles all the time."""
-    robot = config.robot
-    planning = config.planning
+) -> Pilot:
+    """Follow the manifold from stop to stop at the demonstrations' pace.
+
+    The hand is protected, unless the configuration says that the tool is a point.
+
+    Args:
+        robot: Frame, rate, horizon, and duration if the demonstrations' own is not wanted.
+        planning: Limits, tool and constraint.
+        skilled: Trained manifold and its grid.
+        demonstrations: Those that it was trained on, among others.
+        stops: Start, places on the way, and goal.
+        bodies: Obstacles.
+    """
     if planning.tool is ToolShape.auto:
         planning = replace(planning, tool=ToolShape.hand)
     planner = planners.planner(skilled, planning, robot.frame, robot.horizon_s)
-    query = planner.query(path[:1], path[-1:])
-    settings = ControllerSettings(1 / robot.control_hz)
-    controller = GeodesicController(planner, query, demonstrated_pace(skilled, demonstrations), settings)
-    seconds: list[float] = []
-
-    def control(
-        time_s: float, position_m: Float[np.ndarray, "3"], orientation_wxyz: Float[np.ndarray, "4"]
-    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4"]]:
-        before, begun = controller.plans, time.perf_counter()
-        pose = controller.step(time_s, bodies)
-        if controller.plans > before:
-            seconds.append(time.perf_counter() - begun)
-        return pose.position_m[0], pose.orientation[0]
-
-    frame: panda.Frame = robot.frame.value
-    motions = {body.name: body.motion.offset for body in bodies}
-    duration_s = PATIENCE * timed.duration_s
-    loop = closed_loop(scene, control, joints.joints_rad[0], duration_s, robot.control_hz, frame, motions, film)
-    return Replanned(loop, bodies, seconds, controller.waited_s, controller.arrived)
-
-
-def demonstrated_pace(skilled: Skilled, demonstrations: Demonstrations) -> Pace:
-    """How fast the demonstrations are on average at a progress."""
-    data = skilled.manifold.data
     trained = demonstrations.select(skilled.skill.train_demos)
+    durations_s = [one.duration_s for one in trained.trajectories]
+    faster = 1.0 if robot.duration_s is None else float(np.mean(durations_s)) / robot.duration_s
+    data = skilled.manifold.data
+    pace = demonstrated_pace(data.originals, data.progress, durations_s, faster)
+    settings = ControllerSettings(1 / robot.control_hz)
+    legs = range(len(stops) - 1)
+    controllers = [GeodesicController(planner, stops[k : k + 1], stops[k + 1 : k + 2], pace, settings) for k in legs]
+    return Pilot(controllers, bodies)
+
+
+def demonstrated_pace(
+    paths: Sequence[PosePath],
+    progress: Sequence[Float[np.ndarray, " pose"]],
+    durations_s: Sequence[float],
+    faster: float = 1.0,
+) -> Pace:
+    """How fast demonstrations are on average at a progress.
+
+    Args:
+        paths: Demonstrations, even in time.
+        progress: Share of the motion that is done at each of their poses.
+        durations_s: How long they take [s].
+        faster: Times their own pace.
+    """
     shares = np.linspace(0, 1, 50)
-    speeds = []
-    for path, done, one in zip(data.originals, data.progress, trained.trajectories, strict=True):
-        turns = 2 * np.linalg.norm(np.gradient(path.orientation, axis=0), axis=1)
-        steps = np.hypot(np.linalg.norm(np.gradient(path.position_m, axis=0), axis=1), LEVER_M * turns)
-        speeds.append(np.interp(shares, done, steps * (len(path) - 1) / one.duration_s))
-    mean = np.mean(speeds, axis=0)
+    speeds = [
+        np.interp(shares, (done[1:] + done[:-1]) / 2, steps_m(path) * (len(path) - 1) / duration_s)
+        for path, done, duration_s in zip(paths, progress, durations_s, strict=True)
+    ]
+    mean = faster * np.mean(speeds, axis=0)
     mean = np.maximum(mean, SLOWEST * mean.mean())
     return lambda progress: float(np.interp(progress, shares, mean))

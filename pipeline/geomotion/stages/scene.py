@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -136,10 +137,21 @@ def _from_file(config: schema.MeshObstacle | schema.PointCloudObstacle, dim: int
     return load_point_cloud(Path(config.file), config.radius_m, placement)
 
 
-def _vector(key: str, values: list[float], like: Float[Tensor, " D"]) -> Float[Tensor, " D"]:
-    if len(values) != len(like):
+def files(config: schema.ObstacleConfig) -> list[Path]:
+    """The files that obstacles are read from."""
+    from_files = schema.MeshObstacle | schema.PointCloudObstacle
+    return [Path(body.file) for body in solids(config) if isinstance(body, from_files)]
+
+
+def _vector(key: str, values: Any, like: Float[Tensor, " D"]) -> Float[Tensor, " D"]:
+    if not _are_numbers(values) or len(values) != len(like):
         raise InvalidSetting(f"obstacle.{key}", values, f"{len(like)} numbers, one for each coordinate of the state")
     return torch.tensor(values, dtype=like.dtype)
+
+
+def _are_numbers(values: object) -> bool:
+    """Whether this is a list of numbers: what stands in a list of lists is not checked when a command is read."""
+    return isinstance(values, list) and all(isinstance(value, int | float) for value in values)
 
 
 def _rotation(rotation_rad: list[float] | None, dim: int) -> Float[Tensor, "D D"] | None:

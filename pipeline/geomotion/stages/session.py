@@ -13,6 +13,8 @@ from geomotion.errors import InvalidSetting, MissingRun
 from geomotion.tracking import Artefacts, Stage, Tracker, store
 from geomotion.tracking.tracker import CommandRun
 
+TRAINED_BY = "mlflow.source.name"  # tag with program and verb
+
 
 @dataclass(frozen=True)
 class VerbResult:
@@ -49,12 +51,14 @@ class Program:
         steps: Its stages by name, each after those it needs.
         verbs: What each verb does.
         execution_keys: Settings that may be given beside ``run=``, whose training is finished.
+        check: Refuses a configuration that a late stage could not follow, before an early one has begun.
     """
 
     name: str
     steps: Mapping[str, Step]
     verbs: Mapping[str, Callable[["Session"], VerbResult]]
     execution_keys: frozenset[str]
+    check: Callable[[Any], None] = lambda config: None
 
 
 @dataclass
@@ -93,9 +97,11 @@ def open_session(program: Program, verb: str, config: CommandConfig, overrides: 
     Raises:
         MissingRun: If ``run=`` or ``runs=`` names nothing that this program trained.
         InvalidSetting: If a setting beside ``run=`` would change its training.
+        GeomotionError: If the program's own check refuses the configuration.
     """
     if config.run is not None:
         _refuse_training_overrides(program, config.run, overrides)
+    program.check(config)
     wanted = [config.run] if config.run is not None else config.runs
     if wanted and not store.exists(config.tracking):
         raise MissingRun(
@@ -125,6 +131,11 @@ def _trained(tracker: Tracker, run: str) -> dict[str, Artefacts]:
     lineage = tracker.lineage(run)
     if "train" not in lineage:
         raise MissingRun(run, f"it trained nothing. Name a run of `{tracker.program} train` or `{tracker.program} run`")
+    trained_by = tracker.client.get_run(lineage["train"].run_id).data.tags.get(TRAINED_BY, tracker.program)
+    if trained_by.split()[0] != tracker.program:
+        raise MissingRun(
+            run, f"it was trained by `{trained_by}`, whose models are others; use {trained_by.split()[0]} for it"
+        )
     return {name: lineage[name] for name in ("ingest", "train")}
 
 

@@ -20,6 +20,8 @@ from geomotion.tracking import Artefacts, StageRun
 from geomotion.training.manifold_fit import FittedManifold, fit_manifold
 from geomotion.training.poses import PoseTrainingSet
 
+STILL_M = 1e-4  # positions that vary less do not move
+
 
 @dataclass(frozen=True)
 class TrainManifoldConfig:
@@ -49,8 +51,10 @@ def train_manifold(config: TrainManifoldConfig, inputs: Mapping[str, Artefacts],
     demonstrations = storage.load(inputs["ingest"].folder)
     train_demos, test_demos = split(config.selection, demonstrations)
     data = training_set(demonstrations, train_demos, config.manifold)
-    if data.geometry.scale_m == 0:
-        raise DatasetError(demonstrations.name, "the training demonstrations stay where they start; expected motion")
+    if data.geometry.scale_m < STILL_M:
+        raise DatasetError(
+            demonstrations.name, "the positions of the training demonstrations stay where they start; expected motion"
+        )
 
     def build(seed: int) -> PoseVAE:
         return manifold_models.build(config.manifold, data.geometry, seed)
