@@ -156,8 +156,7 @@ class TestRecordings:
             case "lengths and rates":
                 for number, points in enumerate((25, 60, 110)):
                     write(tmp_path / "data", number, *motion(points, number), duration_s=2.0 + number)
-        verb = "run" if what == "one demonstration" else "eval"
-        status, out, lines = gms(verb, *TOY, f"dataset.root={tmp_path / 'data'}", "output=json")
+        status, out, lines = gms("eval", *TOY, f"dataset.root={tmp_path / 'data'}", "output=json")
         assert (status, lines) == (0, [])
         scores = json.loads(out)["scores"]
         (planned,) = (score for name, score in scores["scores"].items() if name.endswith("planned_share"))

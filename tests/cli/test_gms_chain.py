@@ -18,11 +18,11 @@ from geomotion.tracking import StageRun
 pytestmark = pytest.mark.slow
 
 TRAINING = (
-    "dataset=panda/reach_to_grasp", "dataset.points=60", "manifold.kernels=60", "manifold.points=60",
-    "training.steps=150", "training.spread_steps=40", "training.restarts=0",
+    "manifold.kernels=60", "manifold.points=60", "training.steps=150", "training.spread_steps=40",
+    "training.restarts=0",
 )  # fmt: skip
 GRAPH = ("graph.points_per_axis=30",)
-TOY = (*TRAINING, *GRAPH, "robot.film=false")
+TOY = ("dataset=panda/reach_to_grasp", "dataset.points=60", *TRAINING, *GRAPH, "robot.film=false")
 STAGES = ("ingest", "train", "graph", "plan", "evaluate", "replay", "report")
 
 
@@ -61,6 +61,12 @@ def chain(folder) -> Answer:
     command = [sys.executable, "-m", "geomotion_cli", "gms", "run", *TOY, "output=json"]
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
     return done(Answer(process.returncode, process.stdout, process.stderr))
+
+
+@pytest.fixture
+def again(chain) -> tuple[str, ...]:
+    """Settings for training on what the chain read, as a user's own recordings."""
+    return ("dataset=folder", f"dataset.root={chain.artefact('ingest', '')}", *TRAINING)
 
 
 @pytest.fixture
@@ -140,11 +146,11 @@ class TestOneTrainedRun:
         assert answer.err.count("\n") == 1
 
 
-def test_a_sweep_over_seeds_is_compared(chain, here):
-    sweep = done(here("train", "-m", *TRAINING, "seed=0,1", "output=json"))
+def test_a_sweep_over_seeds_is_compared(again, here):
+    sweep = done(here("train", "-m", *again, "seed=0,1", "output=json"))
     documents = [json.loads(line) for line in sweep.out.splitlines()]
     runs = [one["stages"]["train"]["run_id"] for one in documents]
-    assert runs[0] == chain.run_id("train") != runs[1]
+    assert runs[0] != runs[1]
     text = done(here("compare", f"runs=[{','.join(runs)}]", *GRAPH)).out
     assert "heldout.position_dtwd_ratio" in text
     assert all(run in text for run in runs)
@@ -161,16 +167,17 @@ def test_both_programs_share_a_store_and_find_their_own_runs(chain, here):
         assert re.fullmatch(rf"{program} eval: error: run={run}: it was trained by `{trainer} \w+`.*\n", answer.err)
 
 
-def test_an_interrupted_training_goes_on_to_the_same_model(chain, here, folder, monkeypatch):
-    command = ("train", *TRAINING, "seed=7", "training.checkpoint_every_steps=10", "output=json")
+def test_an_interrupted_training_goes_on_to_the_same_model(again, here, folder, monkeypatch):
+    command = ("train", *again, "seed=7", "training.checkpoint_every_steps=10", "output=json")
     with monkeypatch.context() as patched:
         patched.setattr(StageRun, "log_series", lambda *_: os.kill(os.getpid(), signal.SIGINT))
         stopped = here(*command)
     assert stopped.status == 130
     assert "Repeat the command to continue where it stopped." in stopped.err
-    assert len(list((folder / "runs/work").glob("*.checkpoint"))) == 1
+    assert len(list((folder / "runs/work").glob("*.checkpoint*"))) == 1
     resumed, repeated = done(here(*command)), done(here(*command, "reuse=false"))
-    assert not list((folder / "runs/work").glob("*.checkpoint"))
+    assert "train: continues at step" in resumed.err and "continues" not in repeated.err
+    assert not list((folder / "runs/work").glob("*.checkpoint*"))
     one, other = (
         torch.load(answer.artefact("train", "model.pt"), weights_only=True)["parameters"]
         for answer in (resumed, repeated)
@@ -180,11 +187,11 @@ def test_an_interrupted_training_goes_on_to_the_same_model(chain, here, folder, 
         torch.testing.assert_close(values, other[name], rtol=0, atol=0)
 
 
-def test_a_way_between_antipodal_clusters_is_told_by_its_energy_and_not_executed(here):
+def test_a_way_between_antipodal_clusters_is_told_by_its_energy_and_not_executed(again, here):
     """Fig. 3.6: start and goal are one orientation's two signs, each in a cluster of its own."""
     ends = ("planning.start=demo:0", "planning.goal=antipode:0")
     anywhere = ("planning.leave_data_m=10", "planning.leave_data_rad=4")
-    answer = done(here("replay", *TOY, "manifold.antipodal=doubled", *ends, *anywhere, "output=json"), status=3)
+    answer = done(here("replay", *again, *GRAPH, "manifold.antipodal=doubled", *ends, *anywhere, "output=json"), 3)
     plan = json.loads(answer.artefact("plan", "plan.json").read_text())
     (leg,) = plan["legs"]
     assert leg["status"] == "crosses"
@@ -196,7 +203,7 @@ def test_a_way_between_antipodal_clusters_is_told_by_its_energy_and_not_executed
     assert not answer.artefact("replay", "trajectory").exists()
 
 
-def test_three_latent_dimensions_work(here):
+def test_three_latent_dimensions_work(again, here):
     settings = ("manifold.latent_dim=3", "graph.points_per_axis=12", "output=json")
-    answer = done(here("eval", *TRAINING, *settings))
+    answer = done(here("eval", *again, *settings))
     assert np.isfinite(answer.document["scores"]["scores"]["heldout.position_dtwd_ratio"]["value"])

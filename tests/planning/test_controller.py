@@ -23,7 +23,7 @@ def controller(planner, pose_on_strip):
     """Builds one that goes along the whole strip."""
 
     made, ends = (
-        planner(25, constraint=CONSTRAINT, tool=TOOL, samples=80),
+        planner(25, constraint=CONSTRAINT, tool=TOOL, samples=50),
         (pose_on_strip(0.0, 0.01), pose_on_strip(1.0)),
     )
 

@@ -173,7 +173,7 @@ class KnowsAWayRound(Planner):
         pass
 
     def plan(self, query, bodies=()):
-        status = PlanStatus.crosses if "wall" in planners.names(bodies) else PlanStatus.found
+        status = PlanStatus.crosses if "wall" in planners.names(list(bodies)) else PlanStatus.found
         return Plan(status, status.value, np.zeros((0, 2)))
 
 

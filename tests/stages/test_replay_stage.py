@@ -13,7 +13,7 @@ from geomotion.errors import InvalidSetting
 from geomotion.files import write_json
 from geomotion.scores.paths import PosePath
 from geomotion.stages.graph import GraphStageConfig, graph, load_skilled
-from geomotion.stages.plan import PlanStageConfig, plan
+from geomotion.stages.plan import PlanStageConfig, joined, make_plans
 from geomotion.stages.replan import make_pilot
 from geomotion.stages.replay import ReplayStageConfig, replay, replay_table
 from geomotion.stages.train_manifold import TrainManifoldConfig, train_manifold
@@ -36,10 +36,10 @@ def trained(dataset, folder, steps: int) -> dict[str, Artefacts]:
     """Demonstrations, a manifold of few training steps, and its graph."""
     storage.save(preprocess(readers.read(dataset), dataset.preprocess), folder / "ingest")
     inputs = {"ingest": Artefacts("ingest", "0", folder / "ingest", "")}
-    training = schema.ManifoldTraining(steps=steps, spread_steps=20, restarts=0)
+    training = schema.ManifoldTraining(steps=steps, spread_steps=10, restarts=0)
     stages = (
         ("train", train_manifold, TrainManifoldConfig(dataset, schema.ManifoldConfig(), training, 0)),
-        ("graph", graph, GraphStageConfig(schema.GraphConfig(points_per_axis=40), METRIC)),
+        ("graph", graph, GraphStageConfig(schema.GraphConfig(points_per_axis=30), METRIC)),
     )
     for name, stage, config in stages:
         stage(config, inputs, stage_run(folder / name))
@@ -49,19 +49,19 @@ def trained(dataset, folder, steps: int) -> dict[str, Artefacts]:
 
 @pytest.fixture(scope="module")
 def skill(tmp_path_factory) -> dict[str, Artefacts]:
-    return trained(REACH, tmp_path_factory.mktemp("reach"), 400)
+    return trained(REACH, tmp_path_factory.mktemp("reach"), 300)
 
 
 @pytest.fixture
 def replayed(skill, tmp_path):
     """Plans and executes; returns the folder of the replay and its document."""
 
+    skilled, demonstrations = load_skilled(skill, METRIC), storage.load(skill["ingest"].folder)
+
     def execute(robot=FILMLESS, obstacle=None, planning=None, moved_m=(0.0, 0.0, 0.0)):
-        planning, obstacle = planning or schema.PlanningConfig(samples=60), obstacle or schema.NoObstacle()
-        config = PlanStageConfig(planning, METRIC, obstacle, robot.frame)
-        plan(config, skill, stage_run(tmp_path / "plan"))
-        if any(moved_m):
-            _move(tmp_path / "plan/path.npz", np.array(moved_m))
+        planning, obstacle = planning or schema.PlanningConfig(samples=30), obstacle or schema.NoObstacle()
+        plans = make_plans(PlanStageConfig(planning, METRIC, obstacle, robot.frame), skilled, demonstrations).plans
+        _write_plan(tmp_path / "plan", plans, np.array(moved_m))
         inputs = skill | {"plan": Artefacts("plan", "0", tmp_path / "plan", "")}
         run = stage_run(tmp_path / "replay")
         replay(ReplayStageConfig(robot, planning, METRIC, obstacle), inputs, run)
@@ -70,11 +70,15 @@ def replayed(skill, tmp_path):
     return execute
 
 
-def _move(path, offset_m: np.ndarray) -> None:
-    with np.load(path) as stored:
-        arrays = dict(stored)
-    arrays["position_m"] = arrays["position_m"] + np.linspace(0, 1, len(arrays["position_m"]))[:, None] * offset_m
-    np.savez(path, **arrays)
+def _write_plan(folder, plans, moved_m: np.ndarray) -> None:
+    """What the plan stage leaves for others, the path ever farther away up to an offset."""
+    folder.mkdir()
+    found = all(one.found for one in plans)
+    write_json(folder / "plan.json", {"found": found, "legs": [one.as_dict() for one in plans]})
+    if found:
+        path, progress = joined(plans)
+        position_m = path.position_m + np.linspace(0, 1, len(path))[:, None] * moved_m
+        np.savez(folder / "path.npz", position_m=position_m, orientation=path.orientation, progress=progress)
 
 
 def test_a_replay_leaves_numbers_a_film_a_trajectory_and_a_picture(replayed):
@@ -94,10 +98,10 @@ def test_a_replay_leaves_numbers_a_film_a_trajectory_and_a_picture(replayed):
 
 
 def test_poses_out_of_reach_are_reported_with_index_and_distance(replayed):
-    _, document = replayed(moved_m=(0.6, 0.0, 0.0))
+    _, document = replayed(planning=schema.PlanningConfig(samples=12), moved_m=(0.6, 0.0, 0.0))
     unreachable = document["unreachable"]
-    assert document["reached_share"] == 1 - len(unreachable) / 60
-    assert unreachable[-1]["index"] == 59
+    assert document["reached_share"] == 1 - len(unreachable) / 12
+    assert unreachable[-1]["index"] == 11
     assert 0.01 < unreachable[-1]["position_error_m"] < 0.6
     assert unreachable == sorted(unreachable, key=lambda one: one["index"])
     assert f"pose {unreachable[0]['index']}" in replay_table(document)
@@ -113,7 +117,7 @@ def test_without_a_path_nothing_is_executed_and_the_reason_is_given(replayed):
 
 
 def test_poses_in_a_plane_are_refused(tmp_path):
-    inputs = trained(JC, tmp_path, 60)
+    inputs = trained(JC, tmp_path, 5)
     write_json(tmp_path / "plan.json", {"found": True})
     config = ReplayStageConfig(FILMLESS, schema.PlanningConfig(), METRIC, schema.NoObstacle())
     with pytest.raises(InvalidSetting, match=r"poses in R2 x S2.*expected poses in R3 x S3"):

@@ -62,7 +62,8 @@ class Following:
         self._at_m = float(self._behind_m[np.linalg.norm(curve.codes - code, axis=1).argmin()])
         self._gone_m = 0.0
         self._aside = vectors(pose)[0] - self._values(self._poses, np.array([self._at_m]))[0]
-        aside_m = np.hypot(*(np.linalg.norm(part) for part in (self._aside[:dim], 2 * LEVER_M * self._aside[dim:])))
+        turned_m = 2 * LEVER_M * np.linalg.norm(self._aside[dim:])
+        aside_m = float(np.hypot(np.linalg.norm(self._aside[:dim]), turned_m))
         self._blend_m = max(BLEND_M, BLEND * aside_m)
 
     def go(self, way_m: float) -> None:

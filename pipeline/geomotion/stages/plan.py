@@ -87,9 +87,11 @@ def make_plans(config: PlanStageConfig, skilled: Skilled, demonstrations: Demons
     planner = planners.planner(skilled, config.planning, config.frame)
     places = planners.places(config.planning, skilled, demonstrations, planner)
     bodies = moving_bodies(config.obstacle, skilled.skill.geometry.position_dim)
-    queries, plans = [], []
-    for start, goal in pairwise(places):  # one after the other: a query sets the graph up
-        queries.append(planner.query(start.pose, goal.pose, (start.code, goal.code)))
+    queries: list[Query] = []
+    plans: list[Plan] = []
+    for start, goal in pairwise(places):  # one after the other: each leg goes on at the node where the last one ended
+        code = planner.surface.grid.nodes[queries[-1].goal][None] if queries else start.code
+        queries.append(planner.query(start.pose, goal.pose, (code, goal.code)))
         plans.append(plan_leg(planner, queries[-1], bodies))
     others = []
     for start, goal in planners.other_pairs(config.planning, skilled, demonstrations, planner):

@@ -132,7 +132,8 @@ def _antipode(key: str, value: str, number: int, end: int, path: PosePath, plann
         raise InvalidSetting(f"planning.{key}", value, "a manifold trained with manifold.antipodal=doubled")
     which = slice(0, 1) if end == 0 else slice(-1, None)
     pose = PosePath(path.position_m[which], -path.orientation[which])
-    return Place(f"end of demonstration {number} with -q", pose, planner.manifold.encode(pose, float(end != 0)))  # type: ignore[attr-defined]
+    name = f"{'start' if end == 0 else 'end'} of demonstration {number} with -q"
+    return Place(name, pose, planner.manifold.encode(pose, float(end != 0)))  # type: ignore[attr-defined]
 
 
 def _number(key: str, value: str, text: str, count: int) -> int:

@@ -145,10 +145,10 @@ def replay_table(document: Mapping[str, Any]) -> str:
     if not document["executed"]:
         return f"not executed: {document['reason']}"
     lost = f", {len(document['unreachable'])} not" if document["unreachable"] else ""
-    timing = "in closed loop" if document["closed_loop"] else document["timing"]
+    timing = f"{document['timing']}, stretched {document['stretch']:.2f} times"
     rows = [
         ("reached by inverse kinematics", f"{document['reached_share']:.1%} of the poses{lost}"),
-        ("duration", f"{document['duration_s']:.2f} s ({timing}, stretched {document['stretch']:.2f} times)"),
+        ("duration", f"{document['duration_s']:.2f} s ({'in closed loop' if document['closed_loop'] else timing})"),
         (
             "tracking error",
             f"at most {1000 * document['tracking_worst_m']:.2f} mm, "
