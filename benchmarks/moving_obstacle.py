@@ -27,7 +27,7 @@ from geomotion.obstacles.motion import ConstantVelocity, MovingBody
 from geomotion.obstacles.solids import Sphere
 from geomotion.planning.controller import ControllerSettings, GeodesicController, Pace, steps_m
 from geomotion.planning.manifold import Surface
-from geomotion.planning.obstruction import Constraint, Tool
+from geomotion.planning.obstruction import Constraint, Tool, distances
 from geomotion.planning.planner import Planner, PlannerSettings
 from geomotion.robot import panda
 from geomotion.robot.closed_loop import closed_loop
@@ -64,6 +64,7 @@ class Trial:
     seed: int
     touched: tuple[str, ...]
     clearance_m: float
+    unaware_m: float
     arrived: bool
     waited_s: float
     replanning_ms: tuple[float, ...]
@@ -105,6 +106,13 @@ def sphere(task: Task, seed: int) -> MovingBody:
     return MovingBody("sphere", Sphere(begin, RADIUS_M), ConstantVelocity(velocity))
 
 
+def unaware_m(task: Task, body: MovingBody) -> float:
+    """Smallest distance between the sphere and the balls around hand and fingers, if these took the free path."""
+    tool = task.planner.settings.tool
+    poses = zip(tool.points(task.path)[:, None], task.time_s.tolist(), strict=True)
+    return min(float(distances([body], points_m, tool.radii_m, time_s).min()) for points_m, time_s in poses)
+
+
 def run(task: Task, seed: int) -> Trial:
     """One trial in the simulator."""
     body, ends = sphere(task, seed), (task.path[:1], task.path[-1:])
@@ -125,7 +133,7 @@ def run(task: Task, seed: int) -> Trial:
     clearance_m = min(loop.tracking.smallest_clearance_m[link] for link in PROTECTED)
     touched = tuple(loop.tracking.contact_steps.get(body.name, {}))
     milliseconds = tuple(1e3 * one for one in pilot.seconds)
-    return Trial(seed, touched, clearance_m, pilot.reached_goal, pilot.waited_s, milliseconds)
+    return Trial(seed, touched, clearance_m, unaware_m(task, body), pilot.reached_goal, pilot.waited_s, milliseconds)
 
 
 def summary(trials: list[Trial]) -> str:
@@ -137,7 +145,9 @@ def summary(trials: list[Trial]) -> str:
     room_mm = 1e3 * np.array([trial.clearance_m for trial in trials])
     waited_s = np.array([trial.waited_s for trial in trials])
     replanning = np.concatenate([trial.replanning_ms for trial in trials])
+    unaware = sum(trial.unaware_m < 0 for trial in trials)
     rows = [
+        ("aimed well", f"{unaware} of {count} would come into the balls around the hand on the free path"),
         ("contact of hand or fingers", f"{of_hand} of {count} trials"),
         ("contact of another link", f"{of_arm} of {count} trials"),
         ("  by link", ", ".join(f"{link}: {number}" for link, number in sorted(by_link.items())) or "none"),

@@ -173,7 +173,7 @@ def turning(q_norm=1.0, signs=None):
 
 def test_mended_quaternions_are_counted_in_one_warning(caplog):
     lengths = np.ones(10)
-    lengths[[2, 5, 6]] = 1.004, 0.997, 1.00001
+    lengths[[2, 5, 6]] = 1.4, 0.997, 1.00001
     signs = np.array([1, 1, -1, 1, 1, 1, 1, -1, -1, -1.0])[:, None]  # three changes
     result = preprocess(turning(lengths, signs), PreprocessConfig())
     (record,) = caplog.records

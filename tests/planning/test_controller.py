@@ -66,9 +66,9 @@ def test_without_obstacles_it_follows_the_plan_at_the_pace_asked_for(controller,
     plan = pilot.planner.plan(pilot.query)
     lengths_m, progress = steps_m(plan.path.poses), plan.path.progress
     needed_s = float((lengths_m / [pace((a + b) / 2) for a, b in pairwise(progress)]).sum())
-    driven(pilot, [], 0.95 * needed_s)
+    driven(pilot, [], 0.9 * needed_s)
     assert not pilot.arrived
-    poses, _ = driven(pilot, [], 0.1 * needed_s)
+    poses, _ = driven(pilot, [], 0.15 * needed_s)
     assert pilot.arrived
     assert pilot.waited_s == 0
     np.testing.assert_allclose(poses.position_m[-1], pose_on_strip(1.0).position_m[0], atol=1e-6)

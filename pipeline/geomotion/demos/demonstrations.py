@@ -20,7 +20,10 @@ CHANNEL_UNITS = {
     "joint_velocity_rad_per_s": "rad/s",
 }
 UNIT_AXES = {"orientation_wxyz": ("w", "x", "y", "z"), "direction_xyz": ("x", "y", "z")}  # channels on S³ and on S²
-UNIT_NORM_TOLERANCE = 1e-2  # those printed with three digits still pass
+UNIT_NORM_TOLERANCE = {
+    "orientation_wxyz": 0.5,  # the rotation is clear all the same; preprocessing mends the length and says so
+    "direction_xyz": 1e-2,  # those printed with three digits still pass
+}
 VELOCITY_OF = {"position_m": "velocity_m_per_s", "joints_rad": "joint_velocity_rad_per_s"}
 
 
@@ -172,7 +175,7 @@ def _validate_unit(name: str, place: str, values: Array, channel: str) -> None:
     if values.shape[1] != width:
         raise DatasetError(name, f"{place}: {what} with {values.shape[1]} axes; expected {width}")
     norms = np.linalg.norm(values, axis=1)
-    bad = np.flatnonzero(np.abs(norms - 1) > UNIT_NORM_TOLERANCE)
+    bad = np.flatnonzero(np.abs(norms - 1) > UNIT_NORM_TOLERANCE[channel])
     if bad.size:
         raise DatasetError(name, f"{place}, row {bad[0]}: {what} of norm {norms[bad[0]]:g}; expected 1")
 

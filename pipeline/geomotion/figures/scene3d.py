@@ -23,6 +23,7 @@ AXIS_COLOURS = {"tool x": "#CC3311", "tool y": "#009E73", "tool z": "#56B4E9"}
 HELD_OUT_DASH, LINE_DASH = "dot", "dash"
 GREY, SPHERE = "#595959", "#E8E8E8"
 MERIDIAN_DEG = 30
+CONFIG = {"displaylogo": False}
 HEIGHT = "92vh"
 CAMERA = {"eye": {"x": 1.5, "y": 1.5, "z": 0.9}}
 
@@ -38,7 +39,7 @@ def save_scene(picture: PlanPicture, path: Path) -> None:
         DiskFull: If space ran out.
     """
     write_text(
-        path, scene(picture).to_html(include_plotlyjs=True, default_height=HEIGHT, config={"displaylogo": False})
+        path, scene(picture).to_html(include_plotlyjs=True, default_height=HEIGHT, div_id="scene", config=CONFIG)
     )
 
 

@@ -130,8 +130,8 @@ class Tracker:
     ) -> Artefacts:
         checkpoint = self.work / f"{key}.checkpoint"
         if not self.reuse:
-            checkpoint.unlink(missing_ok=True)
-        run_id = self._stopped(key) if checkpoint.is_file() else None
+            self._discard(checkpoint)
+        run_id = self._stopped(key) if any(self._kept(checkpoint)) else None
         if run_id is None:
             tags = {STAGE: stage.name, KEY: key, PARENT: parent.run_id, "mlflow.source.name": parent.name}
             run_id = self._create(stage.name, tags | {INPUT + name: found.run_id for name, found in inputs.items()})
@@ -150,8 +150,16 @@ class Tracker:
             with store.store_errors(self.uri):
                 self.client.log_artifacts(run_id, str(folder))
                 self.client.set_tag(run_id, DIGEST, digest)
-        checkpoint.unlink(missing_ok=True)
+        self._discard(checkpoint)
         return self._artefacts(self.client.get_run(run_id))
+
+    def _kept(self, checkpoint: Path) -> list[Path]:
+        """A checkpoint and those beside it of a training in several phases."""
+        return list(self.work.glob(f"{checkpoint.name}*"))
+
+    def _discard(self, checkpoint: Path) -> None:
+        for path in self._kept(checkpoint):
+            path.unlink(missing_ok=True)
 
     @contextmanager
     def _scratch(self, key: str) -> Iterator[Path]:
