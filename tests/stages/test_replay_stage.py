@@ -15,7 +15,7 @@ from geomotion.scores.paths import PosePath
 from geomotion.stages.graph import GraphStageConfig, graph, load_skilled
 from geomotion.stages.plan import PlanStageConfig, joined, make_plans
 from geomotion.stages.replan import make_pilot
-from geomotion.stages.replay import ReplayStageConfig, replay, replay_table
+from geomotion.stages.replay import PATIENCE, ReplayStageConfig, replay, replay_table
 from geomotion.stages.train_manifold import TrainManifoldConfig, train_manifold
 from geomotion.tracking import Artefacts, StageRun
 
@@ -159,4 +159,5 @@ def test_a_sphere_that_crosses_the_way_does_not_touch_the_hand(replayed, skill, 
     assert not set(document["contacts"].get("sphere", ())) & set(HAND)
     assert min(document["clearance_m"][link] for link in HAND) > 0
     assert document["reached_goal"]
+    assert document["duration_s"] < 0.8 * PATIENCE * 4.0  # about 4 s without waiting; soon after the goal it ends
     assert "goal" in replay_table(document)
