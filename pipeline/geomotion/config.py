@@ -892,13 +892,17 @@ class RobotConfig:
     table: bool = False  # recordings do not say where their table stood; true: one with its top at z = 0
     film: bool = True
     film_fps: float = 10.0
-    tool_length_m: float = 0.2  # of the grasped object, a cylinder of planning.tool_radius_m
+    tool_length_m: float | None = (
+        None  # of the grasped object, a cylinder; null: as long as the ball is that plans have
+    )
     closed_loop: bool | None = None  # replan while moving; null: where an obstacle moves
     control_hz: float = 60.0
     horizon_s: float = 1.0  # how far ahead moving obstacles are looked at
 
     def __post_init__(self) -> None:
-        _require_positive("robot", self, "film_fps", "tool_length_m", "control_hz")
+        _require_positive("robot", self, "film_fps", "control_hz")
+        if self.tool_length_m is not None:
+            _require_positive("robot", self, "tool_length_m")
         _require(0 < self.share_of_limits <= 1, "robot.share_of_limits", self.share_of_limits, "above 0, at most 1")
         _require(self.horizon_s >= 0, "robot.horizon_s", self.horizon_s, "0 or more")
         if self.duration_s is not None:

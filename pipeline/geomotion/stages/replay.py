@@ -186,7 +186,8 @@ def _furnish(
 ) -> None:
     """Put everything into the scene: what the hand holds, obstacles, and the dots of a path in pictures."""
     if config.planning.tool_radius_m > 0:
-        scene.attach(GraspedCylinder(config.planning.tool_radius_m, config.robot.tool_length_m))
+        radius_m = config.planning.tool_radius_m
+        scene.attach(GraspedCylinder(radius_m, config.robot.tool_length_m or 2 * radius_m))
     for body in bodies:
         scene.add_obstacle(body.name, body.body, body.motion.offset(0.0))
     if shown is not None:
