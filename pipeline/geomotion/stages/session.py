@@ -82,7 +82,7 @@ class Session:
 
     def document(self, **content: Any) -> dict[str, Any]:
         """What every verb reports to programs, with the verb's own content."""
-        stages = {name: {"run_id": found.run_id, "folder": str(found.folder)} for name, found in self.done.items()}
+        stages = {found.stage: {"run_id": found.run_id, "folder": str(found.folder)} for found in self.done.values()}
         return {"command": self.command.name, "run_id": self.command.run_id, "stages": stages, **content}
 
     def beside(self, run: str) -> "Session":
