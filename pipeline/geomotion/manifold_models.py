@@ -203,12 +203,9 @@ class PoseManifold:
         return self.network.decode(z).position * self.scale_m + self._centre_m
 
     def _encode(self, path: PosePath, progress: Float[np.ndarray, " pose"]) -> Tensor:
-        centre, scale = self._centre_m.numpy(), self.scale_m
-        poses = np.concatenate([(path.position_m - centre) / scale, path.orientation], axis=1)
+        poses = self.data.geometry.scaled(path)
         return self.network.encode(torch.from_numpy(poses), torch.from_numpy(progress))[0]
 
 
 MIXTURE_SEED = 0
-
-
 ANCHOR_ROOM = 1.5  # times the demonstrated spread of starts: how near a start has to be to count as the same
