@@ -5,7 +5,7 @@ import time
 import pytest
 
 from geomotion.errors import Interrupted
-from geomotion.interrupts import interrupts_as_errors, postponed_interrupts
+from geomotion.interrupts import held_signals, interrupts_as_errors, postponed_interrupts
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -54,6 +54,37 @@ def test_a_signal_after_the_last_safe_point_is_not_lost():
 def test_the_second_signal_stops_at_once():
     done = []
     with pytest.raises(Interrupted), interrupts_as_errors(), postponed_interrupts():
+        os.kill(os.getpid(), signal.SIGINT)
+        done.append(1)
+        os.kill(os.getpid(), signal.SIGINT)
+        done.append(2)
+    assert done == [1]
+
+
+def test_a_held_signal_counts_when_the_block_has_ended():
+    done = []
+    with pytest.raises(Interrupted) as stopped, interrupts_as_errors():
+        with held_signals():
+            os.kill(os.getpid(), signal.SIGTERM)
+            done.append(1)
+        done.append(2)
+    assert done == [1] and stopped.value.exit_code == 128 + signal.SIGTERM
+
+
+def test_a_signal_held_inside_a_loop_that_postpones_waits_for_the_loop():
+    done = []
+    with pytest.raises(Interrupted), interrupts_as_errors(), postponed_interrupts() as pending:
+        with held_signals():
+            os.kill(os.getpid(), signal.SIGINT)
+        done.append(1)
+        pending.raise_if_set()
+        done.append(2)
+    assert done == [1]
+
+
+def test_the_second_signal_ends_a_block_that_holds_them():
+    done = []
+    with pytest.raises(Interrupted), interrupts_as_errors(), held_signals():
         os.kill(os.getpid(), signal.SIGINT)
         done.append(1)
         os.kill(os.getpid(), signal.SIGINT)

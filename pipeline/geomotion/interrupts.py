@@ -65,6 +65,30 @@ def postponed_interrupts() -> Iterator[PendingInterrupt]:
 
 
 @contextmanager
+def held_signals() -> Iterator[None]:
+    """Let the block end before a signal counts; a second signal stops at once.
+
+    For calls into libraries that log what they unwind, or that leave a connection half closed.
+    """
+    if threading.current_thread() is not threading.main_thread():  # signals never arrive in another one
+        yield
+        return
+    held: list[int] = []
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if held:
+            raise StopRequest(number)
+        held.append(number)
+
+    try:
+        with _handlers(handle):
+            yield
+    finally:
+        for number in held:
+            signal.raise_signal(number)  # for the handler that was there before
+
+
+@contextmanager
 def _lost_requests_sent_again() -> Iterator[None]:
     """Finalisers and callbacks of weak references swallow exceptions: repeat a signal that arrives in one of them."""
     before = sys.unraisablehook

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from geomotion.interrupts import held_signals
 from geomotion.scores.score import Score
 from geomotion.tracking.artefacts import Artefacts
 
@@ -80,7 +81,7 @@ class StageRun:
         from mlflow.types import Schema, TensorSpec
 
         tensors = Schema([TensorSpec(np.dtype(np.float32), (-1, dim))])
-        with mlflow.start_run(run_id=self.run_id), warnings.catch_warnings():
+        with held_signals(), mlflow.start_run(run_id=self.run_id), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             mlflow.pyfunc.log_model(
                 name="policy",

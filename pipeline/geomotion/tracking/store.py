@@ -6,12 +6,13 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from filelock import FileLock, Timeout
 
 from geomotion.config import TrackingConfig
 from geomotion.errors import DiskFull, StoreUnavailable, is_disk_full
+from geomotion.interrupts import held_signals
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -98,11 +99,11 @@ def open_store(config: TrackingConfig) -> tuple["MlflowClient", str]:
     with store_errors(uri):
         root.mkdir(parents=True, exist_ok=True)
         try:
-            with FileLock(root / ".store.lock", timeout=LOCK_TIMEOUT_S):
+            with FileLock(root / ".store.lock", timeout=LOCK_TIMEOUT_S), held_signals():
                 if config.uri is None:
                     _prepare(database(config))
                 mlflow.set_tracking_uri(uri)
-                client = mlflow.MlflowClient()
+                client = cast("MlflowClient", _WholeCalls(mlflow.MlflowClient()))
                 found = client.get_experiment_by_name(config.experiment)
                 if found is not None:
                     return client, found.experiment_id
@@ -110,6 +111,22 @@ def open_store(config: TrackingConfig) -> tuple["MlflowClient", str]:
                 return client, client.create_experiment(config.experiment, artifact_location=location)
         except Timeout as error:
             raise StoreUnavailable(uri, f"another program has held {root / '.store.lock'} for two minutes") from error
+
+
+class _WholeCalls:
+    """A client whose calls end before a signal counts: SQLAlchemy logs a traceback for one that it unwinds."""
+
+    def __init__(self, client: "MlflowClient") -> None:
+        self._client = client
+
+    def __getattr__(self, name: str) -> Any:
+        call = getattr(self._client, name)
+
+        def whole(*arguments: Any, **options: Any) -> Any:
+            with held_signals():
+                return call(*arguments, **options)
+
+        return whole
 
 
 def _prepare(path: Path) -> None:
