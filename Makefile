@@ -46,7 +46,7 @@ type: $(STAMP)  ## types of the library and the command line
 
 check: lint type test  ## everything that a change has to pass
 
-bench: $(STAMP)  ## time velocity queries, integration, training, graphs and replanning
+bench: $(STAMP)  ## time velocity queries, integration, training, kinematics, graphs and replanning
 	@for script in benchmarks/[a-z]*.py; do $(BIN)/python $$script || exit 1; done
 
 regress: $(STAMP)  ## small pinned experiments against their stored scores

@@ -28,19 +28,22 @@ from geomotion import manifold_models
 from geomotion.demos.poses import pose_paths
 from geomotion.demos.preprocessing import preprocess
 from geomotion.demos.readers import read
-from geomotion.manifold_models import PoseManifold, PoseSkill
+from geomotion.learned_manifold import LearnedManifold
+from geomotion.manifold_models import Skill
 from geomotion.manifolds.graph import GeodesicGraph, GraphPath
 from geomotion.manifolds.grid import LatentGrid
 from geomotion.obstacles.motion import MovingBody, Waypoints
 from geomotion.obstacles.solids import Sphere
+from geomotion.planning.ends import NOTHING
 from geomotion.planning.manifold import Surface
 from geomotion.planning.obstruction import Constraint
-from geomotion.planning.planner import NOTHING, Planner, PlannerSettings
+from geomotion.planning.planner import Planner, PlannerSettings
 from geomotion.planning.replanner import Replanner
 from geomotion.scores.paths import PosePath
 from geomotion.scores.pose_support import PoseSupport, leave_one_out
 from geomotion.training.manifold_fit import fit_manifold
-from geomotion.training.poses import PoseTrainingSet
+from geomotion.training.poses import PoseSpace
+from geomotion.training.states import TrainingSet
 
 TRAINING_STEPS = 1500
 GRIDS = (100, 150)
@@ -53,7 +56,7 @@ GRAPH = slice(2, 4)  # of a cycle's row: weights and search
 
 
 class NetworkxGraph:
-    """What a planner asks of a graph, answered by networkx.
+    """What a planner asks of a graph whose positions are one block, answered by networkx.
 
     Args:
         graph: The same graph in arrays. It is kept up to date because the curve is checked against it, which takes
@@ -65,7 +68,7 @@ class NetworkxGraph:
         graph.feel(*NOTHING)
         self.graph, self.stores_only, self.pairs = graph, stores_only, graph.edges.tolist()
         names = ("position", "rest", "stretch", "travel", "weight")
-        columns = (graph._position, graph._rest, graph._stretch, graph.travel_m, graph.weights)
+        columns = (*graph._position, graph._rest, graph._stretch, graph.travel_m, graph.weights)
         rows = zip(*(column.tolist() for column in columns), strict=True)
         self.networkx = networkx.Graph()
         self.networkx.add_nodes_from(range(graph.nodes))
@@ -83,7 +86,17 @@ class NetworkxGraph:
         if self.stores_only:
             self._store(np.flatnonzero(self.graph.weights != before))
         else:
-            self._weigh(nodes.tolist(), factor.tolist(), room_m.tolist())
+            self._weigh(nodes.tolist(), factor[0].tolist(), room_m.tolist())
+
+    def shut(self, nodes: np.ndarray) -> None:
+        before = self.graph.weights.copy()
+        self.graph.shut(nodes)
+        if self.stores_only:
+            self._store(np.flatnonzero(self.graph.weights != before))
+        else:
+            for _, _, edge in self.networkx.edges(nodes.tolist(), data=True):
+                edge["weight"] = math.inf
+            self._felt = [*self._felt, *nodes.tolist()]
 
     def shortest_path(self, start: int, goal: int, guess: GraphPath | None = None) -> GraphPath:
         nodes = np.array(networkx.shortest_path(self.networkx, start, goal, weight="weight"))
@@ -112,14 +125,16 @@ class Stopwatch:
     def __init__(self, planner: Planner) -> None:
         self.spent: dict[str, float] = defaultdict(float)
         for owner, method, part in (
-            (planner, "search", "distances"), (planner.graph, "feel", "weights"),
-            (planner.graph, "shortest_path", "search"), (planner, "fit", "curve"), (planner, "clearance", "clearance"),
+            (planner, "sense", "distances"), (planner.graph, "feel", "weights"),
+            (planner.graph, "shut", "shut"), (planner.graph, "shortest_path", "search"), (planner, "fit", "curve"),
+            (planner, "clearances", "clearance"),
         ):  # fmt: skip
             setattr(owner, method, self._timed(getattr(owner, method), part))
 
     def read(self) -> list[float]:
         """Seconds of each part since the last reading."""
-        self.spent["distances"] -= self.spent["weights"] + self.spent["search"]  # happen within it
+        self.spent["distances"] -= self.spent["weights"]  # happens within it
+        self.spent["weights"] += self.spent["shut"]
         spent = [self.spent[part] for part in PARTS]
         self.spent.clear()
         return spent
@@ -134,27 +149,28 @@ class Stopwatch:
         return timed
 
 
-def trained() -> tuple[PoseManifold, PoseTrainingSet]:
+def trained() -> tuple[LearnedManifold, TrainingSet]:
     """A manifold of reaching motions."""
     dataset = schema.PandaReachDataset(name="panda/reach_to_grasp")
     demonstrations = preprocess(read(dataset), dataset.preprocess)
-    config = schema.ManifoldConfig()
-    data = PoseTrainingSet.of(pose_paths(demonstrations, config.points), demonstrations.groups, config.carry_ends)
+    config = manifold_models.settled(schema.ManifoldConfig(), arm=None)
+    paths = pose_paths(demonstrations, config.points)
+    data = TrainingSet.of(PoseSpace.of(paths), paths, demonstrations.groups, config.carry_ends)
     with tempfile.TemporaryDirectory() as folder:
         fitted = fit_manifold(
             data,
             config,
             schema.ManifoldTraining(steps=TRAINING_STEPS),
-            lambda seed: manifold_models.build(config, data.geometry, seed),
+            lambda seed: manifold_models.build(config, data.space, seed),
             0,
             Path(folder) / "checkpoint",
             lambda step, values: None,
         )
-    skill = PoseSkill(fitted.network, config, data.geometry, tuple(range(len(data.paths))), ())
-    return PoseManifold(skill, data, schema.MetricConfig()), data
+    skill = Skill(fitted.network, config, data.space, tuple(range(len(data.paths))), ())
+    return LearnedManifold(skill, data, schema.MetricConfig()), data
 
 
-def planner_on(manifold: PoseManifold, data: PoseTrainingSet, surface: Surface, constraint: Constraint) -> Planner:
+def planner_on(manifold: LearnedManifold, data: TrainingSet, surface: Surface, constraint: Constraint) -> Planner:
     """A planner with the support cap that `gms graph` would find."""
     cap_m, cap_rad = (apart.max() for apart in leave_one_out(data.paths))
     settings = PlannerSettings(cap_m, cap_rad, constraint=constraint)
@@ -178,7 +194,7 @@ def cycles(planner: Planner, demonstration: PosePath, every: int = 1) -> tuple[n
     replanner = Replanner(planner, demonstration[:1], demonstration[-1:])
     free = replanner.replan((), 0.0)
     assert free is not None
-    ball, stopwatch = ball_along(free.path.poses.position_m), Stopwatch(planner)
+    ball, stopwatch = ball_along(free.path.states.position_m), Stopwatch(planner)
     times_s = np.linspace(0, 1, CYCLES)
     for time_s in times_s[: WARM_UP_CYCLES if every == 1 else 1]:
         replanner.replan([ball], time_s)
@@ -206,7 +222,7 @@ def _resident_mib() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def build_row(manifold: PoseManifold, data: PoseTrainingSet, points: int) -> tuple[str, Surface]:
+def build_row(manifold: LearnedManifold, data: TrainingSet, points: int) -> tuple[str, Surface]:
     """What a grid costs in time and memory, and what the same graph costs in networkx."""
     grid = LatentGrid.around(manifold.all_codes, points, schema.GraphConfig().margin)
     begun = time.perf_counter()

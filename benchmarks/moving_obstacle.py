@@ -25,14 +25,15 @@ from geomotion.demos.readers import read
 from geomotion.manifolds.grid import LatentGrid
 from geomotion.obstacles.motion import ConstantVelocity, MovingBody
 from geomotion.obstacles.solids import Sphere
-from geomotion.planning.controller import ControllerSettings, GeodesicController, Pace, steps_m
+from geomotion.planning.controller import ControllerSettings, GeodesicController, Pace
 from geomotion.planning.manifold import Surface
 from geomotion.planning.obstruction import Constraint, Tool, distances
 from geomotion.planning.planner import Planner, PlannerSettings
 from geomotion.robot import panda
 from geomotion.robot.closed_loop import closed_loop
 from geomotion.robot.inverse_kinematics import solve_path
-from geomotion.robot.scene import PandaScene
+from geomotion.robot.panda_arm import panda_arm
+from geomotion.robot.scene import ArmScene
 from geomotion.scores.paths import PosePath
 from geomotion.scores.pose_support import PoseSupport, leave_one_out
 from geomotion.stages.replan import Pilot, demonstrated_pace
@@ -77,7 +78,7 @@ def make_task() -> Task:
     centres_m, radii_m = panda.hand_balls("grasp_target")
     cap_m, cap_rad = (apart.max() for apart in leave_one_out(data.paths))
     settings = PlannerSettings(
-        cap_m + LEAVE_M, cap_rad + LEAVE_RAD, tool=Tool(centres_m, radii_m), constraint=CONSTRAINT
+        cap_m + LEAVE_M, cap_rad + LEAVE_RAD, shape=Tool(centres_m, radii_m), constraint=CONSTRAINT
     )
     ends = manifold.anchors(0), manifold.anchors(-1)
     planner = Planner(manifold, surface, PoseSupport.of(data.originals), *ends, settings)
@@ -87,9 +88,9 @@ def make_task() -> Task:
     first = data.originals[0]
     path = planner.plan(planner.query(first[:1], first[-1:])).path
     assert path is not None
-    steps_s = steps_m(path.poses) / [pace(progress) for progress in path.progress[:-1]]
-    joints = solve_path(path.poses.position_m, path.poses.orientation).joints_rad
-    return Task(planner, path.poses, np.concatenate([[0.0], np.cumsum(steps_s)]), pace, joints[0])
+    steps_s = path.states.steps_m() / [pace(progress) for progress in path.progress[:-1]]
+    joints = solve_path(path.states.position_m, path.states.orientation).joints_rad
+    return Task(planner, path.states, np.concatenate([[0.0], np.cumsum(steps_s)]), pace, joints[0])
 
 
 def sphere(task: Task, seed: int) -> MovingBody:
@@ -108,9 +109,9 @@ def sphere(task: Task, seed: int) -> MovingBody:
 
 def unaware_m(task: Task, body: MovingBody) -> float:
     """Smallest distance between the sphere and the balls around hand and fingers, if these took the free path."""
-    tool = task.planner.settings.tool
-    poses = zip(tool.points(task.path)[:, None], task.time_s.tolist(), strict=True)
-    return min(float(distances([body], points_m, tool.radii_m, time_s).min()) for points_m, time_s in poses)
+    shape = task.planner.settings.shape
+    poses = zip(shape.points(task.path)[:, None], task.time_s.tolist(), strict=True)
+    return min(float(distances([body], points_m, shape.radii_m, time_s).min()) for points_m, time_s in poses)
 
 
 def run(task: Task, seed: int) -> Trial:
@@ -118,7 +119,7 @@ def run(task: Task, seed: int) -> Trial:
     body, ends = sphere(task, seed), (task.path[:1], task.path[-1:])
     controller = GeodesicController(task.planner, *ends, task.pace, ControllerSettings(1 / CONTROL_HZ))
     pilot = Pilot([controller], [body])
-    with PandaScene(table=False) as scene:
+    with ArmScene(panda_arm()) as scene:
         scene.add_obstacle(body.name, body.body)
         for piece in scene.obstacles[body.name].pieces:
             scene.client.setCollisionFilterGroupMask(piece, -1, 0, 0)

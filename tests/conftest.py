@@ -2,15 +2,16 @@
 
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
+import jaxtyping
 import pytest
-from jaxtyping import install_import_hook
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-_hook = install_import_hook("geomotion", "beartype.beartype")
+_hook = jaxtyping.install_import_hook("geomotion", "beartype.beartype")
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
@@ -22,6 +23,14 @@ def _folder(path: Path, what: str) -> Path:
             pytest.fail(message)
         pytest.skip(message)
     return path
+
+
+@pytest.fixture
+def without_shape_checks() -> Iterator[None]:
+    """Checking shapes while a program is recorded would fix its batch size; outside the tests nothing checks them."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.fixture(scope="session")

@@ -20,10 +20,12 @@ LAYERS = (  # each may import those above it in this list, and itself
     {"scores"},
     {"planning"},
     {"config"},
-    {"networks", "robot", "baselines", "obstacles_files"},
+    {"robot", "baselines", "obstacles_files"},
+    {"networks", "arms"},
     {"demos"},
     {"training"},
     {"models", "manifold_models", "export", "policy_model"},
+    {"learned_manifold"},
     {"figures"},
     {"tracking"},
     {"stages"},
@@ -34,9 +36,11 @@ MATHEMATICS_LIBRARIES = {"jaxtyping", "numpy", "roma", "scipy", "shapely", "torc
 FRAMEWORKS = {"hydra", "mlflow", "omegaconf"}
 FRAMEWORK_USERS = {"config", "tracking", "stages", "policy_model"}  # the last is run by MLflow, outside of us
 CONFIG_READERS = {
+    "arms",
     "demos",
     "models",
     "manifold_models",
+    "learned_manifold",
     "training",
     "tracking",
     "stages",

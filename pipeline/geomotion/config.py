@@ -28,6 +28,8 @@ STACKED_LASA_SHAPES = {
 }  # Sec. 6.4 stacks two and four shapes without naming them
 ROBOTASKS9_TASKS = ("bottle2shelf", "matfolding", "openbox", "pouring", "scoop", "wineglass")  # those with a checksum
 LETTERS = ("c", "j", "l", "n", "s", "sine", "u", "v", "w", "z")
+REACH_TARGETS = 3  # places of an object to be grasped
+DIVERGENCE_WEIGHT = 0.2  # of a manifold of poses
 POURING_GROUPS = 3  # bottles, each poured into its own cup
 
 
@@ -81,6 +83,13 @@ class LengthUnit(Enum):
     mm = "mm"
 
 
+class AngleUnit(Enum):
+    """Unit of joint positions in a user's file."""
+
+    rad = "rad"
+    deg = "deg"
+
+
 @dataclass
 class PreprocessConfig:
     """Steps in the order in which they are applied; each one that does something is recorded with the data."""
@@ -108,8 +117,11 @@ class DatasetConfig:
 
     name: str = MISSING
     state_channels: list[str] = default(default_factory=lambda: ["position_m"])  # what a field is learned on
-    train_demos: list[int] | None = None  # null: all but the last two (all, where there are fewer than four)
+    train_demos: list[int] | None = (
+        None  # null: all but the last ones held out (all, where less than half would be left)
+    )
     test_demos: list[int] | None = None  # null: every demonstration that is not trained on
+    held_out: int | None = None  # how many of the last ones are held out, where train_demos is null; null: two
     preprocess: PreprocessConfig = default(default_factory=PreprocessConfig)
 
 
@@ -156,6 +168,8 @@ class FolderDataset(DatasetConfig):
     root: str = MISSING
     sampling_rate_hz: float | None = None  # only for files without a time column
     length_unit: LengthUnit = LengthUnit.m  # of position columns without a unit in their name
+    angle_unit: AngleUnit = AngleUnit.rad  # of joint columns, but those whose name ends in _deg
+    joint_columns: list[str] = default(default_factory=list)  # columns of joints whose names do not say so
 
     def __post_init__(self) -> None:
         if self.sampling_rate_hz is not None:
@@ -230,6 +244,130 @@ class PandaPouringDataset(GeneratedDataset):
         if self.train_demos is None and self.test_demos is None and self.demos >= 2 * POURING_GROUPS:
             last = self.demos - POURING_GROUPS  # null: one of every group is held out
             self.train_demos, self.test_demos = list(range(last)), list(range(last, self.demos))
+
+
+# ---------------------------------------------------------------- demonstrations in joint space
+class Overlap(Enum):
+    """Where solutions of one task share their joint positions, so that a path may change between them."""
+
+    start = "start"
+    both = "both"  # at the start and at the goal
+    none = "none"
+
+
+@dataclass
+class ElbowConfig:
+    """Joint solutions of one task: swivel angles of the elbow (robot.swivel), evenly around a middle one, Sec. 4.5."""
+
+    solutions: int = 3
+    swivel_rad: float = 0.0  # in the middle; 0: elbow up, positive: to the right of an arm that reaches forwards
+    spread_rad: float = 1.3  # from the middle to the outermost solutions
+    overlap: Overlap = Overlap.none
+
+    def __post_init__(self) -> None:
+        _require_positive("dataset.elbow", self, "solutions")
+        _require(self.spread_rad >= 0, "dataset.elbow.spread_rad", self.spread_rad, "0 or more")
+
+
+@dataclass
+class JointDataset(GeneratedDataset):
+    """Joint positions of the simulated Panda, whose elbow takes several ways, Sec. 4.5."""
+
+    elbow: ElbowConfig = default(default_factory=ElbowConfig)
+    demos: int = 15  # of all solutions, in turn
+    duration_s: float = 6.0
+    state_channels: list[str] = default(default_factory=lambda: ["joints_rad"])
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.held_out is None:
+            self.held_out = self.elbow.solutions * self.groups  # one of every solution and group
+
+    @property
+    def groups(self) -> int:
+        """Variants of the task, each of which all solutions are shown of."""
+        return 1
+
+
+@dataclass
+class PandaReachJointDataset(JointDataset):
+    """Reach to grasp, Sec. 4.5.1: alike at the hand, apart at the elbow."""
+
+    targets: list[int] = default(default_factory=lambda: [0])  # of panda/reach_to_grasp, 0 to 2, in turn
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        known = len(self.targets) > 0 and set(self.targets) <= set(range(REACH_TARGETS))
+        _require(known, "dataset.targets", self.targets, f"one or more of 0 to {REACH_TARGETS - 1}")
+
+    @property
+    def groups(self) -> int:
+        """Targets."""
+        return len(self.targets)
+
+
+@dataclass
+class PandaPouringJointDataset(JointDataset):
+    """Pouring from three bottles in turn, Sec. 4.5.2."""
+
+    elbow: ElbowConfig = default(default_factory=lambda: ElbowConfig(solutions=1, swivel_rad=-0.6))
+    demos: int = 18  # six of every group
+
+    @property
+    def groups(self) -> int:
+        """Bottles."""
+        return POURING_GROUPS
+
+
+@dataclass
+class PandaCircleJointDataset(JointDataset):
+    """The hand goes round a circle, Sec. 4.5, Fig. 4.5."""
+
+    elbow: ElbowConfig = default(default_factory=lambda: ElbowConfig(overlap=Overlap.none))
+    radius_m: float = 0.12
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("dataset", self, "radius_m")
+
+
+@dataclass
+class RoboTasks9JointDataset(RoboTasks9Dataset):
+    """Joint positions derived from RoboTasks9 by inverse kinematics: every recording, with every way of the elbow."""
+
+    elbow: ElbowConfig = default(
+        # from one solution to the next, the elbow would pass straight above the shoulder, a singularity in most tasks
+        default_factory=lambda: ElbowConfig(swivel_rad=-0.4, spread_rad=0.9)
+    )
+    points: int = 200  # of each recording, even in time
+    variation: float = 1.0  # of the elbow between recordings; 0: none, 1: about what people do
+    seed: int = 0
+    state_channels: list[str] = default(default_factory=lambda: ["joints_rad"])
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.name = f"robotasks9_joint/{self.task}"
+        if self.held_out is None:
+            self.held_out = 2 * self.elbow.solutions  # of the last two recordings, all
+        _require(self.points >= 10, "dataset.points", self.points, "10 or more")
+        _require(0 <= self.variation <= 3, "dataset.variation", self.variation, "a number from 0 to 3")
+        _require_seed("dataset.", self)
+
+
+@dataclass
+class PlanarSCurveDataset(GeneratedDataset):
+    """The tip of a planar arm of two links follows an S, elbow up and elbow down, Sec. 4.3, Fig. 4.1."""
+
+    demos: int = 14  # of both branches, in turn
+    duration_s: float = 3.0
+    size_m: float = 0.2  # height of the S
+    state_channels: list[str] = default(default_factory=lambda: ["joints_rad"])
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("dataset", self, "size_m")
+        if self.held_out is None:
+            self.held_out = 2  # one of each branch
 
 
 # ---------------------------------------------------------------- models
@@ -411,6 +549,53 @@ class EigenvalueRegulariser(SpreadRegulariser):
 
 
 # ---------------------------------------------------------------- geodesic motion skills
+@dataclass
+class ArmConfig:
+    """A serial arm of turning joints, from one link of its URDF to another."""
+
+    name: str = MISSING
+    base_link: str = MISSING  # coordinates are those of its frame
+    tip_link: str = MISSING  # the end effector
+
+
+@dataclass
+class PandaArm(ArmConfig):
+    """The Franka Emika Panda with its hand; its tip is between the fingers."""
+
+    name: str = "panda"
+    base_link: str = "panda_link0"
+    tip_link: str = "panda_grasptarget"
+
+
+@dataclass
+class PlanarArm(ArmConfig):
+    """Two links of 0.30 m and 0.25 m in a plane, as in Fig. 4.1."""
+
+    name: str = "planar_2dof"
+    base_link: str = "base"
+    tip_link: str = "tip"
+
+
+@dataclass
+class UrdfArm(ArmConfig):
+    """A user's own arm."""
+
+    name: str = "urdf"
+    urdf: str = MISSING  # path of the file
+    acceleration_rad_per_s2: float = 5.0  # of every joint, as URDFs do not say
+    jerk_rad_per_s3: float = 500.0
+
+    def __post_init__(self) -> None:
+        _require_positive("arm", self, "acceleration_rad_per_s2", "jerk_rad_per_s3")
+
+
+class Space(Enum):
+    """What a manifold is learned of."""
+
+    pose = "pose"  # of the end effector, Ch. 3
+    joint = "joint"  # configurations of an arm, Ch. 4
+
+
 class Antipodal(Enum):
     """What is done about q and -q being one orientation."""
 
@@ -423,9 +608,9 @@ class Antipodal(Enum):
 
 @dataclass
 class ManifoldConfig:
-    """The variational auto-encoder of poses, Ch. 3."""
+    """The variational auto-encoder of poses, Ch. 3, or of configurations, Ch. 4."""
 
-    latent_dim: int = 2  # Sec. 3.5.5
+    latent_dim: int | None = None  # null: 2 for poses, Sec. 3.5.5, and 3 for configurations, Sec. 4.3.2
     hidden_units: list[int] = default(default_factory=lambda: [200, 100])  # Sec. 3.5.5; reversed in the decoder
     kernels: int = 500  # Sec. 3.5.5
     bandwidth: float = 1.5  # of the kernels, times their median spacing; from 4 on the walls around the data are gone
@@ -436,12 +621,16 @@ class ManifoldConfig:
     encode_progress: bool = True  # poses are encoded with their share of the motion; false: poses alone (Ch. 3)
     carry_ends: bool = True  # learn demonstrations carried to one start and goal; false: as they are (Ch. 3)
     mixed_copies: int = 5  # mixtures of two demonstrations of a group, for each demonstration; 0: none (Ch. 3)
+    points_between_joints: int = 0  # further points of the arm that the metric is taken of, on each of its segments
 
     def __post_init__(self) -> None:
         _require_positive("manifold", self, "kernels", "bandwidth", "largest_std", "smallest_concentration")
-        _require(self.latent_dim in (2, 3), "manifold.latent_dim", self.latent_dim, "2 or 3: geodesics need a grid")
+        _require(
+            self.latent_dim in (None, 2, 3), "manifold.latent_dim", self.latent_dim, "2 or 3: geodesics need a grid"
+        )
         _require(self.points >= 10, "manifold.points", self.points, "10 or more")
-        _require(self.mixed_copies >= 0, "manifold.mixed_copies", self.mixed_copies, "0 or more")
+        for name in ("mixed_copies", "points_between_joints"):
+            _require(getattr(self, name) >= 0, f"manifold.{name}", getattr(self, name), "0 or more")
         _require_layer_widths("manifold", self.hidden_units)
 
 
@@ -462,12 +651,13 @@ class MetricConfig:
 class GraphConfig:
     """The decoded latent grid, Sec. 3.5.4."""
 
-    points_per_axis: int = 100  # Fig. 3.3
+    points_per_axis: int | None = None  # null: 100 in the plane, Fig. 3.3, and 50 in space
     margin: float = 0.1  # around the encoded demonstrations, of their extent
     memory_limit_gib: float = 4.0
 
     def __post_init__(self) -> None:
-        _require(self.points_per_axis >= 10, "graph.points_per_axis", self.points_per_axis, "10 or more")
+        if self.points_per_axis is not None:
+            _require(self.points_per_axis >= 10, "graph.points_per_axis", self.points_per_axis, "10 or more")
         _require(self.margin >= 0, "graph.margin", self.margin, "0 or more")
         _require_positive("graph", self, "memory_limit_gib")
 
@@ -605,18 +795,21 @@ class VelocityTraining(TrainingConfig):
 
 @dataclass
 class ManifoldTraining(TrainingConfig):
-    """Means of a pose manifold by (3.6) with fixed spreads, then the spreads by likelihood."""
+    """Means of a manifold by (3.6) or (4.1) with fixed spreads, then the spreads by likelihood."""
 
     steps: int = 4000
     learning_rate: float = 2e-3
     batch_points: int = 512
-    position_weight: float = 1.0  # β₁
+    position_weight: float = 1.0  # β₁; of joints, too
     orientation_weight: float = 1.0  # β₂
-    divergence_weight: float = 0.2  # of the divergence from the prior
+    divergence_weight: float | None = None  # of the divergence from the prior; null: 0.2, and 1 for configurations
     warm_up: float = 0.3  # share of the steps over which the divergence comes in
     fixed_std: float = 0.03  # σ while the means are trained, times the size of the data
     fixed_concentration: float = 1000.0  # κ meanwhile
     progress_std: float = 0.03
+    volume_weight: float = 1.0  # configurations: of log V, (4.1), (4.2); 0: none
+    volume_points: int = 64  # of each batch
+    volume_regularisation: float = 1e-3  # added to JᵀJ of the kinematics [m², rad²], Sec. 4.3.2
     spread_steps: int = 800
     spread_learning_rate: float = 0.05
     restarts: int = 2  # with other seeds, where the latent space collapsed or is folded
@@ -625,11 +818,18 @@ class ManifoldTraining(TrainingConfig):
         super().__post_init__()
         _require_positive(
             "training", self, "batch_points", "position_weight", "orientation_weight", "fixed_std",
-            "fixed_concentration", "progress_std", "spread_steps", "spread_learning_rate",
+            "fixed_concentration", "progress_std", "spread_steps", "spread_learning_rate", "volume_points",
+            "volume_regularisation",
         )  # fmt: skip
-        _require(self.divergence_weight >= 0, "training.divergence_weight", self.divergence_weight, "0 or more")
+        for name in ("divergence_weight", "volume_weight"):
+            _require((getattr(self, name) or 0) >= 0, f"training.{name}", getattr(self, name), "0 or more")
         _require(self.restarts >= 0, "training.restarts", self.restarts, "0 or more")
         _require(0 <= self.warm_up <= 1, "training.warm_up", self.warm_up, "a share between 0 and 1")
+
+    def divergence_at(self, progress: float) -> float:
+        """Weight of the divergence at a share of the training."""
+        weight = DIVERGENCE_WEIGHT if self.divergence_weight is None else self.divergence_weight
+        return weight * (min(1.0, progress / self.warm_up) if self.warm_up > 0 else 1.0)
 
 
 @dataclass
@@ -883,9 +1083,9 @@ class CheckConfig:
 
 @dataclass
 class RobotConfig:
-    """The simulated Panda."""
+    """The simulated arm."""
 
-    frame: EndEffectorFrame = EndEffectorFrame.grasp_target
+    frame: EndEffectorFrame = EndEffectorFrame.grasp_target  # of the Panda, for poses
     timing: TimingLaw = TimingLaw.demonstration
     duration_s: float | None = None  # null: the mean duration of the demonstrations
     share_of_limits: float = 0.5  # of velocity, acceleration and jerk, for timing=fastest
@@ -910,11 +1110,29 @@ class RobotConfig:
 
 
 @dataclass
+class ArmFailuresConfig:
+    """Random joint solutions of decoded poses, and how many of them touch the obstacle, Sec. 4.4, Fig. 4.4."""
+
+    study: bool = False
+    points_per_axis: int = 40  # of the latent plane; 150 in the thesis
+    solutions: int = 20  # of each pose inside the support cap; 100 in the thesis
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _require(
+            self.points_per_axis >= 2, "evaluation.arm_failures.points_per_axis", self.points_per_axis, "2 or more"
+        )
+        _require_positive("evaluation.arm_failures", self, "solutions")
+        _require_seed("evaluation.arm_failures.", self)
+
+
+@dataclass
 class GeodesicEvaluationConfig:
     """Geodesics between the ends of demonstrations, judged against them."""
 
     samples: int = 200  # points of every compared path
     compare_methods: bool = False  # geodesics by gradient descent and on coarser and finer graphs as well, Fig. 3.3
+    arm_failures: ArmFailuresConfig = default(default_factory=ArmFailuresConfig)
 
     def __post_init__(self) -> None:
         _require(self.samples >= 10, "evaluation.samples", self.samples, "10 or more")
@@ -941,6 +1159,8 @@ class CommandConfig:
 class GmsConfig(CommandConfig):
     """Configuration of every `gms` verb."""
 
+    space: Space | None = None  # null: joint for demonstrations of joints alone, otherwise pose
+    arm: ArmConfig = MISSING
     manifold: ManifoldConfig = default(default_factory=ManifoldConfig)
     training: ManifoldTraining = default(default_factory=ManifoldTraining)
     metric: MetricConfig = default(default_factory=MetricConfig)
@@ -989,12 +1209,21 @@ def _dataset_choices() -> dict[str, dict[str, Any]]:
     return {
         "lasa": {choice: {"shapes": shapes} for choice, shapes in lasa.items()},
         "robotasks9": {task: {"task": task} for task in ROBOTASKS9_TASKS} | {"other": {}},
+        "robotasks9_joint": {task: {"task": task} for task in ROBOTASKS9_TASKS} | {"other": {}},
         "letters": {letter: {"letter": letter} for letter in LETTERS},
         "generated": {"jc": {"defaults": ["jc_schema", "_self_"]}},
         "panda": {
             "reach_to_grasp": {"defaults": ["panda_reach_schema", "_self_"]},
             "pouring_3x3": {"defaults": ["panda_pouring_schema", "_self_"]},
+            "reach_to_grasp_joint": {"defaults": ["panda_reach_joint_schema", "_self_"]},
+            "reach_to_grasp_overlap": {
+                "defaults": ["panda_reach_joint_schema", "_self_"],
+                "elbow": {"overlap": "both"},
+            },
+            "pouring_joint": {"defaults": ["panda_pouring_joint_schema", "_self_"]},
+            "circle_joint": {"defaults": ["panda_circle_joint_schema", "_self_"]},
         },
+        "planar": {"s_curve": {"defaults": ["planar_s_curve_schema", "_self_"]}},
     }
 
 
@@ -1018,6 +1247,7 @@ def register() -> None:
             "eigenvalue": EigenvalueRegulariser,
         },
         "training": {"trajectory": TrajectoryTraining, "velocity": VelocityTraining},
+        "arm": {"panda": PandaArm, "planar_2dof": PlanarArm, "urdf": UrdfArm},
         "obstacle": {
             "none": NoObstacle,
             "sphere": SphereObstacle,
@@ -1032,10 +1262,15 @@ def register() -> None:
             "folder": FolderDataset(name="folder"),
             "lasa_schema": LasaDataset,
             "robotasks9_schema": RoboTasks9Dataset,
+            "robotasks9_joint_schema": RoboTasks9JointDataset,
             "letters_schema": LettersDataset,
             "jc_schema": JCDataset,
             "panda_reach_schema": PandaReachDataset,
             "panda_pouring_schema": PandaPouringDataset,
+            "panda_reach_joint_schema": PandaReachJointDataset,
+            "panda_pouring_joint_schema": PandaPouringJointDataset,
+            "panda_circle_joint_schema": PandaCircleJointDataset,
+            "planar_s_curve_schema": PlanarSCurveDataset,
         },
     }
     for group, nodes in choices.items():

@@ -67,9 +67,10 @@ class MissingRun(GeomotionError):
 class MissingArtefact(GeomotionError):
     """A run exists but lacks what a later stage needs."""
 
-    def __init__(self, stage: str, name: str, run_id: str) -> None:
+    def __init__(self, stage: str, name: str, run_id: str, program: str) -> None:
+        verb = "eval" if stage == "evaluate" else stage
         super().__init__(
-            f"run {run_id} has no {name!r} of stage {stage!r}. Repeat that stage: ncds {stage} reuse=false."
+            f"run {run_id} has no {name!r} of stage {stage!r}. Repeat that stage: {program} {verb} reuse=false."
         )
         self.stage, self.name, self.run_id = stage, name, run_id
 

@@ -1,13 +1,9 @@
 """Bad input meets one clear line, a non-zero status and a store in which nothing half-done counts as done."""
 
-import json
 import os
 import resource
-import shutil
 import signal
 import sqlite3
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,53 +19,6 @@ TOY = (
 )  # fmt: skip
 TIME_S = np.linspace(0, 1, 30)
 GOOD = {"time_s": TIME_S, "x": TIME_S, "y": TIME_S**2}
-
-
-@pytest.fixture(scope="module")
-def folder(_empty_store, tmp_path_factory) -> Path:
-    """A working folder with a store that all commands of this file share."""
-    folder = tmp_path_factory.mktemp("bad")
-    shutil.copytree(_empty_store, folder / "runs")
-    return folder
-
-
-@pytest.fixture
-def ncds(folder, monkeypatch, capfd, undisturbed) -> Callable[..., tuple[int, str, list[str]]]:
-    """``ncds("train", …)`` answers with status, standard output, and lines of standard error less those on progress."""
-    from geomotion_cli.dispatch import main
-
-    monkeypatch.chdir(folder)
-
-    def call(*arguments: str) -> tuple[int, str, list[str]]:
-        status = main("ncds", list(arguments))
-        out, err = capfd.readouterr()
-        return status, out, [line for line in err.splitlines() if ": done in" not in line and ": reused" not in line]
-
-    return call
-
-
-@pytest.fixture
-def refused(ncds, folder):
-    """Assert that a command fails with one line that says `words`, and that `stage` then has no finished run more."""
-
-    def check(arguments: tuple[str, ...], words: str, stage: str, status: int = 1) -> None:
-        before = finished(folder, stage)
-        code, out, lines = ncds(*arguments)
-        assert (code, out) == (status, ""), lines
-        (line,) = lines
-        assert line.startswith(f"ncds {arguments[0]}: error: ")
-        assert words in line
-        assert "internal error" not in line
-        assert finished(folder, stage) == before
-        assert not list((folder / "runs/work").glob("*.outputs"))
-
-    return check
-
-
-def finished(folder: Path, stage: str) -> int:
-    with sqlite3.connect(folder / "runs/mlflow.db") as database:
-        rows = database.execute("SELECT count(*) FROM runs WHERE name = ? AND status = 'FINISHED'", [stage])
-        return rows.fetchone()[0]
 
 
 def csv(folder: Path, number: int = 0, **changes) -> None:
@@ -127,19 +76,23 @@ RECORDINGS: dict[str, tuple[Callable[[Path], None], str]] = {
 def test_bad_recordings_are_refused_by_name(what, tmp_path, refused):
     write, words = RECORDINGS[what]
     write(tmp_path)
-    refused(("train", "dataset=folder", f"dataset.root={tmp_path}"), words, "ingest")
+    refused(("ncds", "train", "dataset=folder", f"dataset.root={tmp_path}"), words, "ingest")
 
 
-def test_good_recordings_in_the_same_place_then_work(tmp_path, ncds, refused):
+def test_good_recordings_in_the_same_place_then_work(tmp_path, here, refused):
     csv(tmp_path, **with_cell("x", 3, np.nan))
-    refused(("ingest", "dataset=folder", f"dataset.root={tmp_path}"), "row 3", "ingest")
+    refused(("ncds", "ingest", "dataset=folder", f"dataset.root={tmp_path}"), "row 3", "ingest")
     csv(tmp_path)
-    assert ncds("ingest", "dataset=folder", f"dataset.root={tmp_path}")[0] == 0
+    here("ncds", "ingest", "dataset=folder", f"dataset.root={tmp_path}").done()
 
 
 def test_a_damaged_lasa_file_is_refused(tmp_path, refused):
     (tmp_path / "Angle.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
-    refused(("ingest", "dataset=lasa/angle", f"dataset.root={tmp_path}"), "Angle.mat: not a LASA recording", "ingest")
+    refused(
+        ("ncds", "ingest", "dataset=lasa/angle", f"dataset.root={tmp_path}"),
+        "Angle.mat: not a LASA recording",
+        "ingest",
+    )
 
 
 SETTINGS = {
@@ -168,7 +121,7 @@ SETTINGS = {
 def test_settings_that_make_no_sense_are_refused(what, refused):
     settings, words, status, stage = SETTINGS[what]
     toy = TOY if not any("=" in one and one.startswith(("dataset=folder", "field")) for one in settings) else ()
-    refused(("train", *toy, *settings), words, stage, status)
+    refused(("ncds", "train", *toy, *settings), words, stage, status)
 
 
 def recordings(folder: Path, count: int, points: int = 30, **columns) -> Path:
@@ -180,31 +133,30 @@ def recordings(folder: Path, count: int, points: int = 30, **columns) -> Path:
     return folder
 
 
-def test_a_flow_needs_two_dimensions(tmp_path, refused, ncds):
+def test_a_flow_needs_two_dimensions(tmp_path, refused, here):
     root = recordings(tmp_path / "one", 3, x=np.square)
-    learn = ("train", "dataset=folder", f"dataset.root={root}", "training.steps=5")
+    learn = ("ncds", "train", "dataset=folder", f"dataset.root={root}", "training.steps=5")
     refused(learn, "use chart=identity in one dimension", "train", 2)
-    assert ncds(*learn, "chart=identity")[0] == 0
+    here(*learn, "chart=identity").done()
 
 
 def test_recordings_that_stand_still_are_refused(tmp_path, refused):
     root = recordings(tmp_path / "still", 1, x=np.ones_like, y=np.ones_like)
-    refused(("train", "dataset=folder", f"dataset.root={root}"), "expected motion", "train")
+    refused(("ncds", "train", "dataset=folder", f"dataset.root={root}"), "expected motion", "train")
 
 
 @pytest.mark.parametrize(("demos", "points"), [(1, 30), (2, 2), (3, 3)])
-def test_few_demonstrations_and_points_are_enough_for_a_training(tmp_path, ncds, demos, points):
+def test_few_demonstrations_and_points_are_enough_for_a_training(tmp_path, here, demos, points):
     root = recordings(tmp_path / "few", demos, points, x=np.square, y=np.cos)
-    status, _, lines = ncds("train", "dataset=folder", f"dataset.root={root}", *TOY[2:])
-    assert (status, lines) == (0, [])
+    assert here("ncds", "train", "dataset=folder", f"dataset.root={root}", *TOY[2:]).done().complaints == []
 
 
 class TestARun:
-    @pytest.fixture(scope="class")
+    @pytest.fixture
     @staticmethod
-    def trained(folder) -> None:
-        command = [sys.executable, "-m", "geomotion_cli", "ncds", "train", *TOY]
-        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    def trained(here) -> None:
+        """Trained once, reused then."""
+        here("ncds", "train", *TOY).done()
 
     @pytest.mark.parametrize(
         ("settings", "words", "status"),
@@ -221,60 +173,63 @@ class TestARun:
         ],
     )
     def test_what_cannot_be_followed_is_refused(self, trained, refused, settings, words, status):
-        refused(("rollout", *settings), words, "rollout", status)
+        refused(("ncds", "rollout", *settings), words, "rollout", status)
 
-    def test_peers_scores_need_their_training_set(self, ncds, refused):
-        assert ncds("train", *TOY, "dataset.train_demos=[0,1]")[0] == 0
-        refused(("eval", "run=latest", "evaluation=peers"), "expected", "evaluate", 2)
+    def test_peers_scores_need_their_training_set(self, here, refused):
+        here("ncds", "train", *TOY, "dataset.train_demos=[0,1]").done()
+        refused(("ncds", "eval", "run=latest", "evaluation=peers"), "expected", "evaluate", 2)
 
     def test_comparing_needs_a_store(self, refused):
-        refused(("compare", "runs=[latest,latest]", "tracking.root=elsewhere"), "there is no store", "evaluate")
+        refused(("ncds", "compare", "runs=[latest,latest]", "tracking.root=elsewhere"), "there is no store", "evaluate")
 
-    def test_a_damaged_model_is_noticed_and_trained_anew(self, ncds, refused):
-        settings = ("train", *TOY, "seed=5", "output=json")
-        model = Path(json.loads(ncds(*settings)[1])["stages"]["train"]["folder"]) / "model.pt"
+    def test_a_damaged_model_is_noticed_and_trained_anew(self, here, refused):
+        command = ("ncds", "train", *TOY, "seed=5", "output=json")
+        model = here(*command).done().artefact("train", "model.pt")
         content = model.read_bytes()
         model.write_bytes(content[: len(content) // 2])
-        refused(("rollout", "run=latest"), "is corrupt", "rollout")
-        again = Path(json.loads(ncds(*settings)[1])["stages"]["train"]["folder"]) / "model.pt"
+        refused(("ncds", "rollout", "run=latest"), "is corrupt", "rollout")
+        again = here(*command).done().artefact("train", "model.pt")
         assert again != model
         assert again.read_bytes() == content
 
-    def test_a_damaged_checkpoint_is_named_and_a_fresh_start_works(self, ncds, refused, folder, monkeypatch):
-        settings = ("train", *TOY, "seed=6")
+    def test_a_damaged_checkpoint_is_named_and_a_fresh_start_works(self, here, refused, folder, monkeypatch):
+        command = ("ncds", "train", *TOY, "seed=6")
         with monkeypatch.context() as patched:
             patched.setattr(StageRun, "log_series", lambda *_: os.kill(os.getpid(), signal.SIGINT))
-            status, _, lines = ncds(*settings)
-        assert status == 130
-        assert lines == ["ncds train: error: stopped by signal 2. Repeat the command to continue where it stopped."]
+            stopped = here(*command).done(130)
+        assert stopped.complaints == [
+            "ncds train: error: stopped by signal 2. Repeat the command to continue where it stopped."
+        ]
         (checkpoint,) = (folder / "runs/work").glob("*.checkpoint")
         checkpoint.write_bytes(checkpoint.read_bytes()[:100])
-        refused(settings, f"{checkpoint} is corrupt", "train")
-        assert ncds(*settings, "reuse=false")[0] == 0
+        refused(command, f"{checkpoint} is corrupt", "train")
+        here(*command, "reuse=false").done()
         assert not checkpoint.exists()
 
 
 class TestTheStore:
-    def test_a_locked_one_is_reported(self, ncds, folder, monkeypatch):
+    def test_a_locked_one_is_reported(self, here, folder, monkeypatch):
         monkeypatch.setattr(store, "BUSY_TIMEOUT_S", 0.2)
         other = sqlite3.connect(folder / "runs/mlflow.db", isolation_level=None)
         try:
             other.execute("PRAGMA locking_mode=EXCLUSIVE")
             other.execute("BEGIN EXCLUSIVE")
-            status, out, lines = ncds("ingest")
+            answer = here("ncds", "ingest").done(1)
         finally:
             other.close()
-        assert (status, out, len(lines)) == (1, "", 1)
-        assert "the database is locked by another program. Set tracking.root=" in lines[0]
-        assert ncds("ingest")[0] == 0
+        assert answer.out == ""
+        (line,) = answer.complaints
+        assert "the database is locked by another program. Set tracking.root=" in line
+        here("ncds", "ingest").done()
 
-    def test_a_folder_that_cannot_be_written_is_reported(self, ncds, tmp_path):
+    def test_a_folder_that_cannot_be_written_is_reported(self, here, tmp_path):
         if os.geteuid() == 0:
             pytest.skip("permissions do not bind the superuser")
         tmp_path.chmod(0o500)
-        status, out, lines = ncds("train", f"tracking.root={tmp_path}/runs")
-        assert (status, out, len(lines)) == (1, "", 1)
-        assert "Permission denied" in lines[0]
+        answer = here("ncds", "train", f"tracking.root={tmp_path}/runs").done(1)
+        assert answer.out == ""
+        (line,) = answer.complaints
+        assert "Permission denied" in line
 
     @pytest.mark.parametrize(
         ("stage", "large"),
@@ -283,9 +238,9 @@ class TestTheStore:
             ("train", ("dataset.points=60", "field=line_integral", "field.hidden_units=[900,900]", "training.steps=1")),
         ],
     )
-    def test_a_full_disk_is_reported_and_space_mends_it(self, refused, ncds, folder, stage, large):
+    def test_a_full_disk_is_reported_and_space_mends_it(self, refused, here, folder, stage, large):
         """A limit on the size of files stands in for the disk: writing beyond it fails in the same way."""
-        command = (stage, "dataset=letters/j", *large)
+        command = ("ncds", stage, "dataset=letters/j", *large)
         before = resource.getrlimit(resource.RLIMIT_FSIZE)
         limit = (folder / "runs/mlflow.db").stat().st_size + 2**20
         try:
@@ -293,4 +248,4 @@ class TestTheStore:
             refused(command, "no space left while writing", stage)
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        assert ncds(*command)[0] == 0
+        here(*command).done()

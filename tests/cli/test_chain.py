@@ -2,9 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,76 +12,21 @@ TOY = (
     "dataset.points=60", "chart.layers=2", "chart.features=8", "training.steps=30",
     "evaluation.region_steps=50", "evaluation.region_starts=9", "evaluation.contraction_grid_points=5",
 )  # fmt: skip
+RUN = ("ncds", "run", "dataset=letters/j", *TOY, "output=json")
 STAGES = ("ingest", "train", "rollout", "evaluate", "export", "report")
 
 
-@dataclass
-class Answer:
-    """What a command left behind."""
-
-    status: int
-    out: str
-    err: str
-
-    @property
-    def document(self):
-        return json.loads(self.out)
-
-    def artefact(self, stage: str, name: str) -> Path:
-        return Path(self.document["stages"][stage]["folder"]) / name
-
-    def read(self, stage: str, name: str):
-        return json.loads(self.artefact(stage, name).read_text())
-
-
-def start(folder: Path, *arguments: str, program: str = "ncds") -> subprocess.Popen:
-    command = [sys.executable, "-m", "geomotion_cli", program, *arguments]
-    return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def finish(process: subprocess.Popen) -> Answer:
-    out, err = process.communicate(timeout=300)
-    return Answer(process.returncode, out, err)
-
-
-def call(folder: Path, *arguments: str, program: str = "ncds") -> Answer:
-    return finish(start(folder, *arguments, program=program))
-
-
-def done(answer: Answer) -> Answer:
-    assert answer.status == 0, answer.err
-    return answer
-
-
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
-    """Where all commands of this file are typed; its store is made by the first."""
-    return tmp_path_factory.mktemp("chain of ncds")  # spaces have to do no harm
-
-
-@pytest.fixture(scope="module")
-def linear(folder) -> Answer:
-    return done(call(folder, "run", "dataset=letters/j", *TOY, "output=json"))
-
-
-@pytest.fixture(scope="module")
-def line_integral(folder) -> Answer:
-    settings = [setting for setting in TOY if not setting.startswith("chart.")]
-    thesis = ("field=line_integral", "field.hidden_units=[6,6]")
-    return done(call(folder, "run", "dataset=letters/j", *settings, *thesis, "output=json"))
+def linear(start, folder):
+    return start(folder, *RUN).answer().done()
 
 
 @pytest.fixture
-def here(folder, monkeypatch, capfd, undisturbed):
-    """A command in this process, where libraries are imported already."""
-    from geomotion_cli.dispatch import main
-
-    monkeypatch.chdir(folder)
-
-    def call(*arguments: str, program: str = "ncds") -> Answer:
-        return Answer(main(program, list(arguments)), *capfd.readouterr())
-
-    return call
+def line_integral(here, without_shape_checks):
+    """Run once, reused then."""
+    settings = [setting for setting in TOY if not setting.startswith("chart.")]
+    thesis = ("field=line_integral", "field.hidden_units=[6,6]")
+    return here("ncds", "run", "dataset=letters/j", *settings, *thesis, "output=json").done()
 
 
 class TestRun:
@@ -144,7 +86,7 @@ class TestRun:
         assert [line.partition(":")[0] for line in linear.err.splitlines()] == list(STAGES)
 
     def test_the_same_command_again_reuses_every_stage(self, linear, here):
-        again = done(here("run", "dataset=letters/j", *TOY, "output=json"))
+        again = here(*RUN).done()
         assert again.document["stages"] == linear.document["stages"]
         lines = again.err.splitlines()
         assert lines[0].startswith("ingest: done")  # the outside world is read anew each time
@@ -168,18 +110,18 @@ class TestOneTrainedRun:
         train = linear.document["stages"]["train"]
         names = (train["run_id"], train["run_id"][:10], train["folder"], linear.document["run_id"])
         for name in names:
-            assert done(here("train", f"run={name}", "output=json")).document["stages"]["train"] == train
+            assert here("ncds", "train", f"run={name}", "output=json").done().document["stages"]["train"] == train
 
     def test_latest_is_the_one_used_last(self, linear, line_integral, here):
         for answer in (linear, line_integral):
             train = answer.document["stages"]["train"]
-            done(here("train", f"run={train['run_id']}"))
-            assert done(here("train", "run=latest", "output=json")).document["stages"]["train"] == train
+            here("ncds", "train", f"run={train['run_id']}").done()
+            assert here("ncds", "train", "run=latest", "output=json").done().document["stages"]["train"] == train
 
     def test_another_evaluation_needs_no_training(self, linear, here):
         train = linear.document["stages"]["train"]["run_id"]
         settings = [setting for setting in TOY if setting.startswith("evaluation.")]
-        answer = done(here("eval", f"run={train}", *settings, "evaluation=peers", "output=json"))
+        answer = here("ncds", "eval", f"run={train}", *settings, "evaluation=peers", "output=json").done()
         assert answer.document["scores"]["protocol"] == "peers"
         assert answer.document["stages"]["train"]["run_id"] == train
         assert "train: " not in answer.err
@@ -190,7 +132,7 @@ class TestOneTrainedRun:
 
         train = linear.document["stages"]["train"]["run_id"]
         where = ("rollout.starts_m=[[0.02,0.03],[0.01,0.0]]", "rollout.duration_s=1.5", "rollout.points=20")
-        answer = done(here("rollout", f"run={train}", *where, "output=json"))
+        answer = here("ncds", "rollout", f"run={train}", *where, "output=json").done()
         rollouts = storage.load(answer.artefact("rollout", "rollouts"))
         starts = [one.channels["position_m"][0] for one in rollouts.trajectories]
         np.testing.assert_allclose(starts, [[0.02, 0.03], [0.01, 0.0]], atol=1e-6)
@@ -199,19 +141,19 @@ class TestOneTrainedRun:
 
     def test_a_report_is_written_of_a_run(self, linear, here):
         settings = [setting for setting in TOY if setting.startswith("evaluation.")]
-        answer = done(here("report", f"run={linear.document['run_id']}", *settings, "output=json"))
+        answer = here("ncds", "report", f"run={linear.document['run_id']}", *settings, "output=json").done()
         assert Path(answer.document["report"]).read_text().startswith("<!doctype html>")
 
     def test_runs_are_compared(self, linear, line_integral, here):
         runs = [answer.document["stages"]["train"]["run_id"] for answer in (linear, line_integral)]
         settings = [setting for setting in TOY if setting.startswith("evaluation.")]
-        answer = done(here("compare", f"runs=[{','.join(runs)}]", *settings, "output=json"))
+        answer = here("ncds", "compare", f"runs=[{','.join(runs)}]", *settings, "output=json").done()
         assert answer.document["comparison"]
-        text = done(here("compare", f"runs=[{','.join(runs)}]", *settings)).out
+        text = here("ncds", "compare", f"runs=[{','.join(runs)}]", *settings).done().out
         assert "dtwd_per_point" in text
 
     def test_a_training_override_beside_run_is_refused(self, linear, here):
-        answer = here("eval", f"run={linear.document['run_id']}", "training.steps=5")
+        answer = here("ncds", "eval", f"run={linear.document['run_id']}", "training.steps=5")
         assert (answer.status, answer.out) == (2, "")
         assert answer.err.startswith("ncds eval: error: training.steps=5 is not valid")
         assert answer.err.count("\n") == 1
@@ -219,36 +161,30 @@ class TestOneTrainedRun:
 
 def test_ingest_prints_a_table_and_is_one_document_for_programs(linear, here):
     for program in ("gms", "ncds"):
-        answer = done(here("ingest", "dataset=letters/s", "dataset.points=60", program=program))
+        answer = here(program, "ingest", "dataset=letters/s", "dataset.points=60").done()
         picture = re.search(r"^picture  (.*)$", answer.out, re.MULTILINE)
         assert Path(picture[1]).read_bytes().startswith(b"\x89PNG")
-        document = done(here("ingest", "dataset=letters/s", "dataset.points=60", "output=json", program=program))
+        document = here(program, "ingest", "dataset=letters/s", "dataset.points=60", "output=json").done()
         assert len(document.document["summary"]["demos"]) == 7
 
 
-def test_commands_at_the_same_time_on_a_fresh_store_succeed_with_the_same_scores(linear, tmp_path):
-    commands = (
-        ("run", "dataset=letters/j", *TOY, "output=json"),
-        ("run", "dataset=letters/j", *TOY, "output=json"),
-        ("train", "dataset=letters/c", *TOY, "output=json"),
-    )
-    answers = [finish(process) for process in [start(tmp_path, *command) for command in commands]]
-    assert [answer.status for answer in answers] == [0, 0, 0], [answer.err for answer in answers]
-    assert answers[0].document["stages"] == answers[1].document["stages"]
-    assert answers[0].document["stages"]["train"] != answers[2].document["stages"]["train"]
+def test_commands_at_the_same_time_on_a_fresh_store_succeed_with_the_same_scores(start, linear, tmp_path):
+    judge = ("ncds", "eval", "dataset=letters/j", *TOY, "output=json")
+    another = ("ncds", "train", "dataset=letters/c", *TOY, "output=json")
+    started = [start(tmp_path, *command) for command in (judge, judge, another)]
+    first, second, third = [command.answer().done() for command in started]
+    assert first.document["stages"] == second.document["stages"]
+    assert first.document["stages"]["train"] != third.document["stages"]["train"]
     # a fresh store and a repeated training change nothing: the seed decides
-    assert answers[0].document["scores"] == linear.document["scores"]
+    assert first.document["scores"] == linear.document["scores"]
 
 
-def test_a_sweep_keeps_what_succeeds_and_fails_for_what_does_not(folder, linear, here):
+def test_a_sweep_keeps_what_succeeds_and_fails_for_what_does_not(here):
     settings = [setting for setting in TOY if not setting.startswith("training.")]
-    answer = call(
-        folder, "train", "-m", "dataset=letters/j", *settings,
-        "training.steps=8", "training.learning_rate=0.01,1e30,0.02", "output=json",
-    )  # fmt: skip
-    assert answer.status == 1
-    first, failed, last = (json.loads(line) for line in answer.out.splitlines())
+    rates = ("training.steps=8", "training.learning_rate=0.01,1e30,0.02")
+    sweep = here("ncds", "train", "-m", "dataset=letters/j", *settings, *rates, "output=json").done(1)
+    first, failed, last = (json.loads(line) for line in sweep.out.splitlines())
     assert failed["error"]["type"] == "TrainingDiverged"
-    assert len([line for line in answer.err.splitlines() if "error" in line]) == 1
+    assert len([line for line in sweep.err.splitlines() if "error" in line]) == 1
     for document in (first, last):
-        assert done(here("train", f"run={document['run_id']}", "output=json")).document["certificate"]
+        assert here("ncds", "train", f"run={document['run_id']}", "output=json").done().document["certificate"]

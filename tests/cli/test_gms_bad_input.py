@@ -1,8 +1,5 @@
 """What is wrong with recordings, settings and obstacles meets `gms` in one clear line, and leaves nothing half-done."""
 
-import json
-import shutil
-import sqlite3
 from pathlib import Path
 
 import numpy as np
@@ -15,54 +12,6 @@ TOY = (
     "training.restarts=0", "graph.points_per_axis=30", "robot.film=false",
 )  # fmt: skip
 PLAN = ("graph.points_per_axis=30",)
-
-
-@pytest.fixture(scope="module")
-def folder(_empty_store, tmp_path_factory) -> Path:
-    """A working folder with a store that all commands of this file share."""
-    folder = tmp_path_factory.mktemp("bad gms")
-    shutil.copytree(_empty_store, folder / "runs")
-    return folder
-
-
-@pytest.fixture
-def gms(folder, monkeypatch, capfd, undisturbed):
-    """``gms("train", …)`` answers with status, standard output, and lines of standard error less those on progress."""
-    from geomotion_cli.dispatch import main
-
-    monkeypatch.chdir(folder)
-
-    def call(*arguments: str) -> tuple[int, str, list[str]]:
-        status = main("gms", list(arguments))
-        out, err = capfd.readouterr()
-        noise = (": done in", ": reused", "is not good")
-        return status, out, [line for line in err.splitlines() if not any(words in line for words in noise)]
-
-    return call
-
-
-@pytest.fixture
-def refused(gms, folder):
-    """Assert that a command fails with one line that says `words`, and that `stage` then has no finished run more."""
-
-    def check(arguments: tuple[str, ...], words: str, stage: str, status: int = 1) -> None:
-        before = finished(folder, stage)
-        code, out, lines = gms(*arguments)
-        assert (code, out) == (status, ""), lines
-        (line,) = lines
-        assert line.startswith(f"gms {arguments[0]}: error: ")
-        assert words in line
-        assert "internal error" not in line
-        assert finished(folder, stage) == before
-        assert not list((folder / "runs/work").glob("*.outputs"))
-
-    return check
-
-
-def finished(folder: Path, stage: str) -> int:
-    with sqlite3.connect(folder / "runs/mlflow.db") as database:
-        rows = database.execute("SELECT count(*) FROM runs WHERE name = ? AND status = 'FINISHED'", [stage])
-        return rows.fetchone()[0]
 
 
 def motion(points: int, bend: float = 0.0, turn_rad: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
@@ -96,24 +45,25 @@ def good(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def trained(gms, good) -> str:
+def trained(here, good) -> str:
     """Id of a trained run; trained once, reused then."""
-    status, out, lines = gms("train", *TOY, f"dataset.root={good}", "output=json")
-    assert (status, lines) == (0, [])
-    return json.loads(out)["run_id"]
+    answer = here("gms", "train", *TOY, f"dataset.root={good}", "output=json").done()
+    assert answer.complaints == []
+    return answer.document["run_id"]
 
 
 class TestRecordings:
-    def test_quaternions_that_are_mended_are_counted_in_one_warning(self, gms, tmp_path):
+    def test_quaternions_that_are_mended_are_counted_in_one_warning(self, here, tmp_path):
         root = recordings(tmp_path / "odd", 3)
         position_m, wxyz = motion(60)
         write(root, 1, position_m, 1.004 * wxyz)
         flipped = wxyz.copy()
         flipped[20:40] *= -1
         write(root, 2, position_m, flipped)
-        status, _, lines = gms("ingest", "dataset=folder", f"dataset.root={root}")
-        assert status == 0
-        assert lines == ["folder: mended 60 quaternions that were not of unit length and 2 flips of their sign"]
+        answer = here("gms", "ingest", "dataset=folder", f"dataset.root={root}").done()
+        assert answer.complaints == [
+            "folder: mended 60 quaternions that were not of unit length and 2 flips of their sign"
+        ]
 
     @pytest.mark.parametrize(("value", "words"), [(np.nan, "expected finite numbers"), (0.0, "norm")])
     def test_quaternions_that_cannot_be_are_refused_by_file_and_row(self, refused, tmp_path, value, words):
@@ -121,16 +71,16 @@ class TestRecordings:
         position_m, wxyz = motion(60)
         wxyz[7] = value
         write(root, 1, position_m, wxyz)
-        command = ("train", *TOY, f"dataset.root={root}")
+        command = ("gms", "train", *TOY, f"dataset.root={root}")
         refused(command, words, "ingest")
         refused(command, "1.csv: demonstration 0 (1), row 7", "ingest")
 
     def test_positions_alone_are_refused_with_what_is_needed(self, refused):
         settings = [setting for setting in TOY if not setting.startswith("dataset")]
-        refused(("run", "dataset=letters/j", *settings), "needs position_m and either orientation_wxyz", "train")
+        refused(("gms", "run", "dataset=letters/j", *settings), "needs position_m and either orientation_wxyz", "train")
 
     @pytest.mark.parametrize("what", ["one demonstration", "two that are identical", "one orientation"])
-    def test_unusual_ones_are_learned_planned_and_judged(self, gms, tmp_path, what):
+    def test_unusual_ones_are_learned_planned_and_judged(self, here, tmp_path, what):
         match what:
             case "one demonstration":
                 recordings(tmp_path / "data", 1)
@@ -141,9 +91,9 @@ class TestRecordings:
                 for number in range(5):
                     position_m, wxyz = motion(60, number - 2)
                     write(tmp_path / "data", number, position_m, np.tile(wxyz[0], (60, 1)))
-        status, out, lines = gms("eval", *TOY, f"dataset.root={tmp_path / 'data'}", "output=json")
-        assert (status, lines) == (0, [])
-        scores = json.loads(out)["scores"]
+        answer = here("gms", "eval", *TOY, f"dataset.root={tmp_path / 'data'}", "output=json").done()
+        assert answer.complaints == []
+        scores = answer.document["scores"]
         (planned,) = (score for name, score in scores["scores"].items() if name.endswith("planned_share"))
         assert planned["value"] == 1
         judged = ["position"] if what == "one orientation" else []
@@ -151,7 +101,7 @@ class TestRecordings:
         assert ratios == {f"{part}_dtwd_ratio" for part in judged}
         assert len([name for name in scores["omitted"] if name.endswith("_dtwd_ratio")]) == 2 - len(judged)
 
-    def test_labels_make_groups_of_demonstrations_of_any_length_and_rate(self, gms, tmp_path):
+    def test_labels_make_groups_of_demonstrations_of_any_length_and_rate(self, here, tmp_path):
         root = tmp_path / "labelled"
         for number in range(6):
             points = (25, 60, 110)[number % 3]
@@ -159,10 +109,10 @@ class TestRecordings:
             group = ("low", "high")[number // 3]
             shifted_m = position_m + np.array([0, 0, 0.05 * (number // 3)])
             write(root, number, shifted_m, wxyz, duration_s=2.0 + number, demo=[group] * points)
-        command = ("eval", *TOY, f"dataset.root={root}", "dataset.test_demos=[]", "output=json")
-        status, out, lines = gms(*command, "dataset.train_demos=[0,1,2,3,4,5]")
-        assert (status, lines) == (0, [])
-        assert json.loads(out)["scores"]["scores"]["pairs.planned_share"]["count"] == 4
+        command = ("gms", "eval", *TOY, f"dataset.root={root}", "dataset.test_demos=[]", "output=json")
+        answer = here(*command, "dataset.train_demos=[0,1,2,3,4,5]").done()
+        assert answer.complaints == []
+        assert answer.document["scores"]["scores"]["pairs.planned_share"]["count"] == 4
 
 
 SETTINGS = {
@@ -181,11 +131,13 @@ SETTINGS = {
 @pytest.mark.parametrize("what", SETTINGS)
 def test_settings_that_make_no_sense_are_refused_before_anything_is_computed(what, refused, good):
     settings, words = SETTINGS[what]
-    refused(("run", *TOY, f"dataset.root={good}", *settings), words, "ingest", 2)
+    refused(("gms", "run", *TOY, f"dataset.root={good}", *settings), words, "ingest", 2)
 
 
 def test_a_grid_too_large_for_a_trained_run_is_refused_too(refused, trained):
-    refused(("graph", f"run={trained}", "graph.points_per_axis=20000"), "graph.points_per_axis=2209 fits", "graph", 2)
+    refused(
+        ("gms", "graph", f"run={trained}", "graph.points_per_axis=20000"), "graph.points_per_axis=2209 fits", "graph", 2
+    )
 
 
 def cube(path: Path, without: int = 0) -> Path:
@@ -199,13 +151,13 @@ def cube(path: Path, without: int = 0) -> Path:
 class TestObstacles:
     WHERE = "obstacle.centre_m=[0.45,0,0.9]"
 
-    def test_an_open_mesh_is_used_with_a_warning_that_counts_its_open_edges(self, gms, trained, tmp_path):
+    def test_an_open_mesh_is_used_with_a_warning_that_counts_its_open_edges(self, here, trained, tmp_path):
         path = cube(tmp_path / "open.obj", without=2)
-        status, out, lines = gms("plan", f"run={trained}", *PLAN, "obstacle=mesh", f"obstacle.file={path}", self.WHERE)
-        assert status == 0
-        (line,) = lines
+        obstacle = ("obstacle=mesh", f"obstacle.file={path}", self.WHERE)
+        answer = here("gms", "plan", f"run={trained}", *PLAN, *obstacle).done()
+        (line,) = answer.complaints
         assert line.startswith(f"{path} is not watertight: 4 edges")
-        assert "found" in out
+        assert "found" in answer.out
 
     def test_files_that_cannot_be_used_are_refused_by_name(self, refused, trained, tmp_path):
         text = cube(tmp_path / "good.obj").read_text().splitlines()
@@ -221,30 +173,31 @@ class TestObstacles:
             ("point_cloud", "nowhere.xyz", " (point cloud) not found"),
         ):
             file = tmp_path / name
-            command = ("plan", f"run={trained}", *PLAN, f"obstacle={kind}", f"obstacle.file={file}", self.WHERE)
+            command = ("gms", "plan", f"run={trained}", *PLAN, f"obstacle={kind}", f"obstacle.file={file}", self.WHERE)
             refused(command, f"{file}{words}", "plan")
 
-    def test_another_content_of_a_file_is_another_plan_and_the_same_one_is_reused(self, gms, trained, tmp_path):
+    def test_another_content_of_a_file_is_another_plan_and_the_same_one_is_reused(self, here, trained, tmp_path):
         cloud = ("obstacle=point_cloud", f"obstacle.file={tmp_path / 'a.npy'}", self.WHERE)
         runs = []
         for points in (1, 1, 2):
             np.save(tmp_path / "a.npy", np.zeros((points, 3)))
-            out = gms("plan", f"run={trained}", *PLAN, *cloud, "output=json")[1]
-            runs.append(json.loads(out)["stages"]["plan"]["run_id"])
+            answer = here("gms", "plan", f"run={trained}", *PLAN, *cloud, "output=json").done()
+            runs.append(answer.run_id("plan"))
         assert runs[0] == runs[1] != runs[2]
 
 
-def test_an_answer_without_a_path_has_a_status_of_its_own(gms, trained):
+def test_an_answer_without_a_path_has_a_status_of_its_own(here, trained):
     far = ("planning.goal=[1.5,0,0.3,0,1,0,0]", *PLAN)
     for verb in ("plan", "replay"):
-        status, out, lines = gms(verb, f"run={trained}", *far)
-        assert (status, lines) == (3, [])
-        assert "the goal is outside the demonstrated region" in out
-        assert "Traceback" not in out
+        answer = here("gms", verb, f"run={trained}", *far).done(3)
+        assert answer.complaints == []
+        assert "the goal is outside the demonstrated region" in answer.out
+        assert "Traceback" not in answer.out
 
 
-def test_poses_that_the_arm_cannot_take_are_listed_with_what_is_missing(gms, good):
-    status, out, lines = gms("replay", *TOY, f"dataset.root={good}", "dataset.preprocess.scale=4")
-    assert (status, lines) == (3, [])
-    assert "0.0% of the poses" in out
-    assert "pose 0" in out and "out of reach" in out and " mm, " in out
+def test_poses_that_the_arm_cannot_take_are_listed_with_what_is_missing(here, good):
+    settings = ("dataset.preprocess.scale=4", "planning.samples=20")
+    answer = here("gms", "replay", *TOY, f"dataset.root={good}", *settings).done(3)
+    assert answer.complaints == []
+    assert "0.0% of the poses" in answer.out
+    assert "pose 0" in answer.out and "out of reach" in answer.out and " mm, " in answer.out

@@ -4,9 +4,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,63 +20,19 @@ TRAINING = (
 )  # fmt: skip
 GRAPH = ("graph.points_per_axis=30",)
 TOY = ("dataset=panda/reach_to_grasp", "dataset.points=60", *TRAINING, *GRAPH, "robot.film=false")
+RUN = ("gms", "run", *TOY, "output=json")
 STAGES = ("ingest", "train", "graph", "plan", "evaluate", "replay", "report")
 
 
-@dataclass
-class Answer:
-    """What a command left behind."""
-
-    status: int
-    out: str
-    err: str
-
-    @property
-    def document(self):
-        return json.loads(self.out)
-
-    def run_id(self, stage: str) -> str:
-        return self.document["stages"][stage]["run_id"]
-
-    def artefact(self, stage: str, name: str) -> Path:
-        return Path(self.document["stages"][stage]["folder"]) / name
-
-
-def done(answer: Answer, status: int = 0) -> Answer:
-    assert answer.status == status, answer.err
-    return answer
-
-
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
-    """Where all commands of this file are typed; its store is made by the first."""
-    return tmp_path_factory.mktemp("chain of gms")  # spaces have to do no harm
-
-
-@pytest.fixture(scope="module")
-def chain(folder) -> Answer:
-    command = [sys.executable, "-m", "geomotion_cli", "gms", "run", *TOY, "output=json"]
-    process = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
-    return done(Answer(process.returncode, process.stdout, process.stderr))
+def chain(start, folder):
+    return start(folder, *RUN).answer().done()
 
 
 @pytest.fixture
 def again(chain) -> tuple[str, ...]:
     """Settings for training on what the chain read, as a user's own recordings."""
     return ("dataset=folder", f"dataset.root={chain.artefact('ingest', '')}", *TRAINING)
-
-
-@pytest.fixture
-def here(folder, monkeypatch, capfd, undisturbed):
-    """A command in this process, where libraries are imported already."""
-    from geomotion_cli.dispatch import main
-
-    monkeypatch.chdir(folder)
-
-    def call(*arguments: str, program: str = "gms") -> Answer:
-        return Answer(main(program, list(arguments)), *capfd.readouterr())
-
-    return call
 
 
 class TestRun:
@@ -110,7 +63,7 @@ class TestRun:
         assert document["replay"]["tracking_worst_m"] < 0.005
 
     def test_the_same_command_again_reuses_every_stage(self, chain, here):
-        again = done(here("run", *TOY, "output=json"))
+        again = here(*RUN).done()
         assert again.document["stages"] == chain.document["stages"]
         lines = again.err.splitlines()
         assert lines[0].startswith("ingest: done")  # the outside world is read anew each time
@@ -123,59 +76,59 @@ class TestOneTrainedRun:
     def test_every_name_of_a_run_finds_the_same_model(self, chain, here):
         train = chain.document["stages"]["train"]
         for name in (train["run_id"], train["run_id"][:10], train["folder"], chain.document["run_id"], "latest"):
-            assert done(here("train", f"run={name}", "output=json")).document["stages"]["train"] == train
+            assert here("gms", "train", f"run={name}", "output=json").done().document["stages"]["train"] == train
 
     def test_judging_it_again_gives_the_same_scores(self, chain, here):
         train = chain.run_id("train")
-        answer = done(here("eval", f"run={train}", *GRAPH, "reuse=false", "output=json"))
+        answer = here("gms", "eval", f"run={train}", *GRAPH, "reuse=false", "output=json").done()
         assert "evaluate: done" in answer.err
         assert answer.document["scores"] == chain.document["scores"]
 
     def test_the_latest_is_planned_executed_and_reported(self, chain, here):
         settings = ("run=latest", *GRAPH, "robot.film=false")
-        planned = done(here("plan", *settings, "planning.start=demo:0", "planning.goal=demo:1"))
+        planned = here("gms", "plan", *settings, "planning.start=demo:0", "planning.goal=demo:1").done()
         assert re.search(r"start of demonstration 0 to end of demonstration 1 +found", planned.out)
         assert Path(re.search(r"^path +(.*)$", planned.out, re.MULTILINE)[1]).is_file()
-        assert "reached by inverse kinematics  100.0%" in done(here("replay", *settings)).out
-        assert Path(done(here("report", *settings, "output=json")).document["report"]).is_file()
+        assert "reached by inverse kinematics  100.0%" in here("gms", "replay", *settings).done().out
+        assert Path(here("gms", "report", *settings, "output=json").done().document["report"]).is_file()
 
     def test_a_training_override_beside_run_is_refused(self, chain, here):
-        answer = here("eval", f"run={chain.document['run_id']}", "manifold.kernels=5")
+        answer = here("gms", "eval", f"run={chain.document['run_id']}", "manifold.kernels=5")
         assert (answer.status, answer.out) == (2, "")
         assert answer.err.startswith("gms eval: error: manifold.kernels=5 is not valid")
         assert answer.err.count("\n") == 1
 
 
 def test_a_sweep_over_seeds_is_compared(again, here):
-    sweep = done(here("train", "-m", *again, "seed=0,1", "output=json"))
+    sweep = here("gms", "train", "-m", *again, "seed=0,1", "output=json").done()
     documents = [json.loads(line) for line in sweep.out.splitlines()]
     runs = [one["stages"]["train"]["run_id"] for one in documents]
     assert runs[0] != runs[1]
-    text = done(here("compare", f"runs=[{','.join(runs)}]", *GRAPH)).out
+    text = here("gms", "compare", f"runs=[{','.join(runs)}]", *GRAPH).done().out
     assert "heldout.position_dtwd_ratio" in text
     assert all(run in text for run in runs)
 
 
 def test_both_programs_share_a_store_and_find_their_own_runs(chain, here):
     toy = ("dataset=letters/j", "dataset.points=40", "chart.layers=1", "chart.features=8", "training.steps=5")
-    other = done(here("train", *toy, "output=json", program="ncds")).document["run_id"]
-    assert "contraction" in done(here("train", "run=latest", program="ncds")).out
-    assert "latent space" in done(here("train", "run=latest")).out
+    other = here("ncds", "train", *toy, "output=json").done().document["run_id"]
+    assert "contraction" in here("ncds", "train", "run=latest").done().out
+    assert "latent space" in here("gms", "train", "run=latest").done().out
     for run, program, trainer in ((other, "gms", "ncds"), (chain.run_id("train"), "ncds", "gms")):
-        answer = here("eval", f"run={run}", program=program)
+        answer = here(program, "eval", f"run={run}")
         assert (answer.status, answer.out) == (1, "")
         assert re.fullmatch(rf"{program} eval: error: run={run}: it was trained by `{trainer} \w+`.*\n", answer.err)
 
 
 def test_an_interrupted_training_goes_on_to_the_same_model(again, here, folder, monkeypatch):
-    command = ("train", *again, "seed=7", "training.checkpoint_every_steps=10", "output=json")
+    command = ("gms", "train", *again, "seed=7", "training.checkpoint_every_steps=10", "output=json")
     with monkeypatch.context() as patched:
         patched.setattr(StageRun, "log_series", lambda *_: os.kill(os.getpid(), signal.SIGINT))
         stopped = here(*command)
     assert stopped.status == 130
     assert "Repeat the command to continue where it stopped." in stopped.err
     assert len(list((folder / "runs/work").glob("*.checkpoint*"))) == 1
-    resumed, repeated = done(here(*command)), done(here(*command, "reuse=false"))
+    resumed, repeated = here(*command).done(), here(*command, "reuse=false").done()
     assert "train: continues at step" in resumed.err and "continues" not in repeated.err
     assert not list((folder / "runs/work").glob("*.checkpoint*"))
     one, other = (
@@ -191,7 +144,9 @@ def test_a_way_between_antipodal_clusters_is_told_by_its_energy_and_not_executed
     """Fig. 3.6: start and goal are one orientation's two signs, each in a cluster of its own."""
     ends = ("planning.start=demo:0", "planning.goal=antipode:0")
     anywhere = ("planning.leave_data_m=10", "planning.leave_data_rad=4")
-    answer = done(here("replay", *again, *GRAPH, "manifold.antipodal=doubled", *ends, *anywhere, "output=json"), 3)
+    answer = here("gms", "replay", *again, *GRAPH, "manifold.antipodal=doubled", *ends, *anywhere, "output=json").done(
+        3
+    )
     plan = json.loads(answer.artefact("plan", "plan.json").read_text())
     (leg,) = plan["legs"]
     assert leg["status"] == "crosses"
@@ -205,5 +160,5 @@ def test_a_way_between_antipodal_clusters_is_told_by_its_energy_and_not_executed
 
 def test_three_latent_dimensions_work(again, here):
     settings = ("manifold.latent_dim=3", "graph.points_per_axis=12", "output=json")
-    answer = done(here("eval", *again, *settings))
+    answer = here("gms", "eval", *again, *settings).done()
     assert np.isfinite(answer.document["scores"]["scores"]["heldout.position_dtwd_ratio"]["value"])

@@ -21,6 +21,7 @@ CHOICES = {choice for _, choice in OPTIONS}
 NEEDED = {  # what has no default
     "dataset=folder": ["dataset.root=recordings"],
     "dataset=robotasks9/other": ["dataset.task=navigation", "dataset.root=recordings"],
+    "dataset=robotasks9_joint/other": ["dataset.task=navigation", "dataset.root=recordings"],
     "obstacle=sphere": ["obstacle.centre_m=[0,0]", "obstacle.radius_m=1"],
     "obstacle=ellipsoid": ["obstacle.centre_m=[0,0]", "obstacle.semi_axes_m=[1,2]"],
     "obstacle=box": ["obstacle.centre_m=[0,0]", "obstacle.sides_m=[1,2]"],

@@ -48,7 +48,7 @@ def poses():
 
 def assert_same(found, expected):
     """Equal to the last bit."""
-    for name in ("name", "space", "frame", "source", "licence", "steps"):
+    for name in ("name", "space", "frame", "source", "licence", "steps", "joint_names"):
         assert getattr(found, name) == getattr(expected, name)
     assert len(found) == len(expected)
     for one, other in zip(found.trajectories, expected.trajectories, strict=True):

@@ -6,6 +6,9 @@ from geomotion.config import LASA_SHAPES, LETTERS, ROBOTASKS9_TASKS
 from geomotion.demos.readers import read
 from geomotion.errors import UnknownName
 
+GENERATED = ("panda/reach_to_grasp", "panda/pouring_3x3", "generated/jc")
+IN_JOINT_SPACE = ("panda/reach_to_grasp_joint", "panda/pouring_joint", "panda/circle_joint", "planar/s_curve")
+
 
 def dataset(choice, *overrides):
     with initialize_config_module(version_base="1.3", config_module="geomotion.conf"):
@@ -20,6 +23,7 @@ def test_every_shape_has_a_choice_in_lower_case(shape):
 @pytest.mark.parametrize("task", ROBOTASKS9_TASKS)
 def test_every_task_has_a_choice(task):
     assert dataset(f"robotasks9/{task}").task == task
+    assert dataset(f"robotasks9_joint/{task}").name == f"robotasks9_joint/{task}"
 
 
 @pytest.mark.parametrize("letter", LETTERS)
@@ -28,10 +32,18 @@ def test_every_letter_has_a_choice_and_can_be_read(letter):
     assert demonstrations.name == f"letters/{letter}"
 
 
-@pytest.mark.parametrize("choice", ["panda/reach_to_grasp", "panda/pouring_3x3", "generated/jc"])
+@pytest.mark.parametrize("choice", [*GENERATED, *IN_JOINT_SPACE])
 def test_every_generated_motion_has_a_choice_and_can_be_read(choice):
     demonstrations = read(dataset(choice, "dataset.demos=1", "dataset.points=10"))
     assert (demonstrations.name, len(demonstrations[0])) == (choice, 10)
+
+
+def test_datasets_of_joint_space_hold_out_every_solution():
+    assert [dataset(choice).held_out for choice in IN_JOINT_SPACE] == [3, 3, 3, 2]
+    assert dataset("panda/reach_to_grasp_joint", "dataset.elbow.solutions=2", "dataset.targets=[0,2]").held_out == 4
+    assert dataset("robotasks9_joint/scoop").held_out == 6
+    assert dataset("robotasks9_joint/scoop", "dataset.elbow.solutions=2").held_out == 4
+    assert dataset("robotasks9_joint/scoop").state_channels == ["joints_rad"]
 
 
 def test_one_of_every_group_is_held_out_however_many_are_asked_for():

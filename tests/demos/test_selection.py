@@ -29,6 +29,12 @@ def test_demonstrations_are_split_as_asked_and_otherwise_the_last_two_are_held_o
     assert split(DatasetConfig(name="some", train_demos=train, test_demos=test), some(count)) == expected
 
 
+@pytest.mark.parametrize(("count", "expected"), [(9, (6, 3)), (6, (3, 3)), (5, (5, 0))])
+def test_as_many_are_held_out_as_the_dataset_says_where_as_many_remain(count, expected):
+    train, test = split(DatasetConfig(name="some", held_out=3), some(count))
+    assert (len(train), len(test)) == expected
+
+
 @pytest.mark.parametrize(
     ("train", "test", "words"),
     [

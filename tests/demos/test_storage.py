@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -14,6 +15,16 @@ def test_a_dataset_comes_back_bit_by_bit(name, request, tmp_path, same):
     demonstrations = request.getfixturevalue(name)
     storage.save(demonstrations, tmp_path)
     same(storage.load(tmp_path), demonstrations)
+
+
+def test_names_of_joints_come_back_and_older_datasets_have_none(poses, tmp_path, same):
+    named = replace(poses, joint_names=("shoulder", "elbow", "wrist"))
+    storage.save(named, tmp_path)
+    same(storage.load(tmp_path), named)
+    info = json.loads((tmp_path / storage.INFO).read_text())
+    del info[storage.OWN_KEY]["joint_names"]
+    (tmp_path / storage.INFO).write_text(json.dumps(info))
+    same(storage.load(tmp_path), poses)
 
 
 def test_every_float64_survives(tmp_path, same):

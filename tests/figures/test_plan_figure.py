@@ -5,21 +5,19 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
 
+from geomotion.figures.joints import LIMIT, JointAxes
 from geomotion.figures.latent import LatentMaps
-from geomotion.figures.plan import (
-    ObstacleShape,
-    PlanPicture,
-    draw_component,
-    draw_obstacle,
-    draw_plan_latent,
-    draw_positions,
-    figure_plan,
-    in_a_row,
-    save_plan_figure,
-)
+from geomotion.figures.plan import figure_plan, plan_data, save_plan_figure
+from geomotion.figures.plan_panels import draw_component, draw_joint, draw_obstacle, draw_plan_latent, draw_positions
+from geomotion.figures.plan_picture import DrawnArm, ObstacleShape, PlanPicture, in_a_row, planes_of
 from geomotion.figures.style import COLOUR
+from geomotion.scores.configurations import ConfigurationPath
 from geomotion.scores.paths import PosePath
+
+from .spaces import maps as tubes
+from .spaces import obstacle as slab
 
 SHARE = np.linspace(0, 1, 50)
 
@@ -39,7 +37,7 @@ def tetrahedron(way):
     return ObstacleShape("wedge", corners, faces, np.asarray(way, dtype=float))
 
 
-def picture(dim=3, directions=False, with_maps=True):
+def picture(dim=3, directions=False):
     axes = np.linspace(-1, 1, 20), np.linspace(-1, 1, 20)
     distance = np.hypot(*np.meshgrid(*axes, indexing="ij"))
     codes = [np.stack([SHARE, SHARE**2], axis=1)]
@@ -47,16 +45,49 @@ def picture(dim=3, directions=False, with_maps=True):
     circle = 0.05 * np.stack([np.cos(6.3 * SHARE), np.sin(6.3 * SHARE)], axis=1)
     outline = ObstacleShape("disc", circle + np.array([0.4, 0.2]), np.empty((0, 3), dtype=int), np.zeros((1, 2)))
     return PlanPicture(
-        maps=maps if with_maps else None,
+        maps=maps,
         codes=codes,
         line=[np.stack([SHARE, SHARE], axis=1)],
-        closed=distance < 0.2 if with_maps else None,
+        closed=distance < 0.2,
         demonstrations=[path(0.1 * number, dim, directions) for number in (1, 2, 3)],
         held_out=[2],
         groups=[0, 0, 0],
         paths=[path(0.25, dim, directions)],
         line_paths=[path(0.0, dim, directions)],
         obstacles=[tetrahedron(np.zeros((1, 3))) if dim == 3 else outline],
+    )
+
+
+def configurations(elbow, lift=0.0):
+    """A planar arm of two links of 0.3 m that reaches out while it unbends, at height zero or rising."""
+    joints = np.stack([-elbow / 2 + 0.3 * SHARE, elbow * (1 - 0.5 * SHARE)], axis=1)
+
+    def tip(joints_rad):
+        shoulder, both = joints_rad[:, 0], joints_rad.sum(axis=1)
+        place = 0.3 * np.stack([np.cos(shoulder) + np.cos(both), np.sin(shoulder) + np.sin(both)], axis=1)
+        turned = np.stack([np.cos(both / 2), 0 * both, 0 * both, np.sin(both / 2)], axis=1)
+        return np.column_stack([place, lift * np.arange(len(joints_rad))]), turned
+
+    return ConfigurationPath(joints, tip)
+
+
+def arm_picture(lift=0.0, in_space=True):
+    """Elbow up and elbow down; the geodesic is elbow up."""
+    up, down, between = (configurations(elbow, lift) for elbow in (1.5, -1.5, 1.2))
+    joints = JointAxes(("shoulder", "elbow"), np.array([-9.0, -2.0]), np.array([9.0, 2.0]))
+    poses = np.array([[[0, 0, 0], [0.2, 0.2, 0], [0.4, 0.1, 0]], [[0, 0, 0], [0.3, 0.0, 0], [0.5, 0.1, 0.0]]])
+    changes = (
+        {"maps": tubes(), "closed": slab(), "codes": tubes().codes[:1], "line": tubes().codes[:1]} if in_space else {}
+    )
+    return replace(
+        picture(),
+        demonstrations=[up, down, up],
+        groups=[0, 1, 0],
+        paths=[between],
+        line_paths=[between],
+        obstacles=[],
+        arm=DrawnArm(joints, [poses], {0: poses, 1: -poses}),
+        **changes,
     )
 
 
@@ -73,7 +104,6 @@ def coloured(ax, colour):
     ("shape", "count"),
     [
         ({}, 1 + 3 + 4),
-        ({"with_maps": False}, 3 + 4),
         ({"dim": 2, "directions": True}, 1 + 1 + 1 + 3),
         ({"dim": 3, "directions": True}, 1 + 3 + 1 + 3),
     ],
@@ -155,6 +185,46 @@ def test_without_a_path_demonstrations_and_obstacles_are_still_shown(tmp_path):
     assert "plan.png" in save_plan_figure(nothing, tmp_path)
 
 
+def test_joints_stand_in_the_place_of_quaternions_with_near_limits():
+    shown = arm_picture()
+    ax = draw_joint(Figure().add_subplot(), shown, 1)
+    (geodesic,) = coloured(ax, "riemannian")
+    np.testing.assert_array_equal(geodesic.get_ydata(), shown.paths[0].joints_rad[:, 1])
+    limits = [line.get_ydata()[0] for line in ax.get_lines() if line.get_linestyle() == LIMIT["linestyle"]]
+    assert limits == [-2.0, 2.0] and ax.get_ylabel() == "elbow [rad]"
+    labels = [one.get_ylabel() for one in panels(figure_plan(shown)) if "share" in one.get_xlabel()]
+    assert labels == ["shoulder [rad]", "elbow [rad]"]
+
+
+def test_an_arm_in_a_plane_has_one_projection_with_its_branches():
+    shown = arm_picture()
+    assert shown.planes == ((0, 1),) and planes_of([path(0.1)]) == ((0, 1), (0, 2), (1, 2))
+    assert planes_of([path(0.1, dim=2)]) == ((0, 1),)
+    ax = draw_positions(Figure().add_subplot(), shown, (0, 1))
+    links = [line for line in ax.get_lines() if len(line.get_xdata()) == 3]
+    assert len(links) == 6 and len({line.get_color() for line in links}) == 3
+    assert [text.get_text() for text in figure_plan(shown).legends[0].texts].count("arm along the path") == 1
+
+
+@pytest.mark.parametrize("obstacles", [[], [tetrahedron(np.zeros((1, 3)))]], ids=["free", "obstacle"])
+def test_an_arm_in_space_is_projected_only_among_obstacles(obstacles):
+    shown = replace(arm_picture(lift=0.01), obstacles=obstacles)
+    assert len(shown.planes) == 3
+    ax = draw_positions(Figure().add_subplot(), shown, (0, 1))
+    assert len([line for line in ax.get_lines() if len(line.get_xdata()) == 3]) == 2 * len(obstacles)
+
+
+def test_a_latent_space_is_drawn_as_tubes_with_the_path_in_them():
+    shown = arm_picture()
+    (ax,) = [one for one in figure_plan(shown).axes if isinstance(one, Axes3D)]
+    (geodesic,) = [
+        line for line in ax.get_lines() if line.get_color() == COLOUR["riemannian"] and len(line.get_xdata()) > 1
+    ]
+    np.testing.assert_array_equal(np.stack(geodesic.get_data_3d(), axis=1), shown.codes[0])
+    labels = [text.get_text() for text in figure_plan(shown).legends[0].texts]
+    assert "taken by obstacles" in labels and any(text.startswith("walls") for text in labels)
+
+
 def test_picture_is_saved_with_its_numbers(tmp_path):
     shown = picture()
     assert save_plan_figure(shown, tmp_path) == ["plan.png", "plan.pdf", "plan.npz"]
@@ -163,3 +233,6 @@ def test_picture_is_saved_with_its_numbers(tmp_path):
         np.testing.assert_array_equal(behind["leg_0_codes"], shown.codes[0])
         np.testing.assert_array_equal(behind["demo_2_orientation"], shown.demonstrations[2].orientation)
         np.testing.assert_array_equal(behind["obstacle_0_faces"], shown.obstacles[0].faces)
+    np.testing.assert_array_equal(
+        plan_data(arm_picture())["demo_1_joints_rad"], arm_picture().demonstrations[1].joints_rad
+    )

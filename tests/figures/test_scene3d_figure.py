@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geomotion.figures.plan import ObstacleShape, PlanPicture
+from geomotion.figures.joints import JointAxes
+from geomotion.figures.plan_picture import DrawnArm, ObstacleShape, PlanPicture
 from geomotion.figures.scene3d import save_scene, scene, triads
 from geomotion.scores.paths import PosePath
+
+from .spaces import maps
 
 SHARE = np.linspace(0, 1, 50)
 CORNERS = 0.1 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
@@ -24,7 +27,7 @@ def path(height, dim=3, directions=False):
 def picture(dim=3, directions=False):
     way = np.linspace(np.zeros(3), [0.0, 0.4, 0.0], 9)
     return PlanPicture(
-        maps=None,
+        maps=maps(),
         codes=[],
         line=[],
         closed=None,
@@ -67,6 +70,22 @@ def test_triads_are_the_columns_of_the_rotation_at_poses_of_the_path():
     np.testing.assert_allclose(ends["tool y"][-1], [0, 0, 0.05], atol=1e-12)
     starts = axes["tool z"].reshape(5, 3, 3)[:, 0]
     np.testing.assert_array_equal(starts[[0, -1]], path(0.0).position_m[[0, -1]])
+
+
+def test_the_arm_is_drawn_along_the_path_and_on_demand_along_demonstrations():
+    poses = np.arange(18.0).reshape(2, 3, 3)
+    joints = JointAxes(("one", "two"), np.full(2, -1.0), np.ones(2))
+    figure = scene(replace(picture(), groups=[0, 1, 0], arm=DrawnArm(joints, [poses], {0: poses, 1: -poses})))
+    (along,), (first,), (second,) = (
+        traces(figure, name)
+        for name in ("arm along the path", "arm, demonstrated in group 0", "arm, demonstrated in group 1")
+    )
+    points = np.stack([along.x, along.y, along.z], axis=1).reshape(2, 4, 3)
+    np.testing.assert_array_equal(points[:, :3], poses)
+    assert np.isnan(points[:, 3]).all()
+    assert along.visible is None and first.visible == second.visible == "legendonly"
+    assert first.line.color != second.line.color
+    assert not traces(scene(picture()), "arm along the path")
 
 
 def test_a_moving_obstacle_is_a_body_at_first_and_a_translucent_one_at_the_end():

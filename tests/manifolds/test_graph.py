@@ -12,15 +12,15 @@ from geomotion.manifolds.graph import GeodesicGraph, GraphPath
 from geomotion.manifolds.grid import LatentGrid, memory_bytes
 
 ANISOTROPY = 1 / math.cos(math.pi / 8)  # 1.082: length of a path in eight directions over that of the straight line
-NONE = np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0)
+NONE = np.zeros(0, dtype=np.intp), np.zeros((1, 0)), np.zeros(0)
 
 
-def random_graph(seed: int = 0, points: int = 8, dim: int = 2) -> GeodesicGraph:
+def random_graph(seed: int = 0, points: int = 8, dim: int = 2, blocks: int = 1) -> GeodesicGraph:
     """Random embeddings, factors and travel."""
     generator = np.random.default_rng(seed)
     grid = LatentGrid(np.zeros(dim), np.ones(dim), points)
     count, edges = points**dim, len(grid.edges)
-    position, rest = generator.normal(size=(count, 3)), generator.normal(size=(count, 4))
+    position, rest = generator.normal(size=(count, blocks, 3)), generator.normal(size=(count, 4))
     return GeodesicGraph(grid, position, rest, generator.uniform(0.5, 2, count), generator.uniform(0.1, 1, edges))
 
 
@@ -28,14 +28,15 @@ def flat_graph(points: int = 21) -> tuple[LatentGrid, GeodesicGraph]:
     """The unit square with its own metric."""
     grid = LatentGrid(np.zeros(2), np.ones(2), points)
     travel = np.linalg.norm(np.diff(grid.nodes[grid.edges], axis=1)[:, 0], axis=1)
-    return grid, GeodesicGraph(grid, grid.nodes, np.zeros((points**2, 1)), np.ones(points**2), travel)
+    return grid, GeodesicGraph(grid, grid.nodes[:, None], np.zeros((points**2, 1)), np.ones(points**2), travel)
 
 
 def feel_at_random(graph: GeodesicGraph, generator: np.random.Generator) -> None:
     """Obstacles on a third of the nodes, scattered or side by side, some of them closing edges."""
     some = generator.choice(graph.nodes, graph.nodes // 3, replace=False)
     nodes = some if generator.random() < 0.5 else np.arange(some.min(), some.min() + graph.nodes // 3) % graph.nodes
-    graph.feel(nodes, 1 + generator.exponential(20, len(nodes)), generator.uniform(-0.1, 1.0, len(nodes)))
+    factor = 1 + generator.exponential(20, (len(graph.factor), len(nodes)))
+    graph.feel(nodes, factor, generator.uniform(-0.1, 1.0, len(nodes)))
 
 
 def as_networkx(graph: GeodesicGraph) -> networkx.Graph:
@@ -46,10 +47,10 @@ def as_networkx(graph: GeodesicGraph) -> networkx.Graph:
     return found
 
 
-@pytest.mark.parametrize(("points", "dim"), [(8, 2), (5, 3)])
+@pytest.mark.parametrize(("points", "dim", "blocks"), [(8, 2, 1), (5, 3, 1), (8, 2, 4)])
 @pytest.mark.parametrize("seed", range(3))
-def test_paths_cost_what_networkx_finds_on_the_same_weights(points, dim, seed):
-    graph, generator = random_graph(seed, points, dim), np.random.default_rng(seed)
+def test_paths_cost_what_networkx_finds_on_the_same_weights(points, dim, blocks, seed):
+    graph, generator = random_graph(seed, points, dim, blocks), np.random.default_rng(seed)
     for _ in range(10):
         feel_at_random(graph, generator)
         graph.close(generator.random(graph.nodes) < 0.2)
@@ -61,18 +62,34 @@ def test_paths_cost_what_networkx_finds_on_the_same_weights(points, dim, seed):
         np.testing.assert_allclose(graph.costs_from(start), expected, rtol=1e-12)
 
 
-def test_weights_are_the_lengths_of_chords_under_all_factors():
+@pytest.mark.parametrize("blocks", [1, 2, 8])
+def test_weights_are_the_lengths_of_chords_under_the_factors_of_all_blocks(blocks):
     generator = np.random.default_rng(0)
     grid = LatentGrid(np.zeros(2), np.ones(2), 4)
-    position, rest, conformal = generator.normal(size=(16, 3)), generator.normal(size=(16, 2)), generator.random(16) + 1
+    position, rest = generator.normal(size=(16, blocks, 3)), generator.normal(size=(16, 2))
+    conformal = generator.random(16) + 1
     graph = GeodesicGraph(grid, position, rest, conformal, np.zeros(len(grid.edges)))
-    factor = generator.random(16) + 1
+    factor = 1 + 20 * generator.random((blocks, 16))
     graph.feel(np.arange(16), factor, np.full(16, np.inf))
     for (i, j), weight in zip(grid.edges, graph.weights, strict=True):
-        squares = [np.square(block[j] - block[i]).sum() for block in (position, rest)]
-        middle = math.sqrt((factor[i] + factor[j]) / 2 * squares[0] + squares[1])
+        chords = position[j] - position[i]
+        weighted = sum((m[i] + m[j]) / 2 * chord @ chord for m, chord in zip(factor, chords, strict=True))
+        middle = math.sqrt(weighted + np.square(rest[j] - rest[i]).sum())
         assert weight == pytest.approx((conformal[i] + conformal[j]) / 2 * middle)
     np.testing.assert_allclose(graph.factor, factor)
+
+
+def test_blocks_with_one_factor_are_one_block():
+    generator = np.random.default_rng(0)
+    grid = LatentGrid(np.zeros(2), np.ones(2), 6)
+    position, others = generator.normal(size=(36, 3, 4)), (generator.normal(size=(36, 2)), generator.random(36) + 1)
+    parts, whole = (
+        GeodesicGraph(grid, one, *others, np.zeros(len(grid.edges))) for one in (position, position.reshape(36, 1, 12))
+    )
+    factor, room = 1 + 20 * generator.random(36), np.full(36, np.inf)
+    parts.feel(np.arange(36), np.tile(factor, (3, 1)), room)
+    whole.feel(np.arange(36), factor[None], room)
+    np.testing.assert_allclose(parts.weights, whole.weights, rtol=1e-12)
 
 
 def test_a_path_on_a_flat_metric_is_at_most_eight_percent_longer_than_the_straight_line():
@@ -90,18 +107,19 @@ def test_a_path_on_a_flat_metric_is_at_most_eight_percent_longer_than_the_straig
 def test_a_path_on_a_sphere_is_nearly_a_great_circle(sphere):
     grid = LatentGrid(np.array([0.9, 0.0]), np.array([2.2, 1.3]), 60)
     anisotropy = 1 / math.cos(math.atan(1 / math.sin(2.2)) / 2)  # of cells that are not square
-    position = sphere().position(torch.from_numpy(grid.nodes)).numpy()
+    position = sphere().positions(torch.from_numpy(grid.nodes)).numpy()
     graph = GeodesicGraph(grid, position, np.zeros((3600, 1)), np.ones(3600), np.zeros(len(grid.edges)))
     generator = np.random.default_rng(0)
     for _ in range(20):
         start, goal = (int(node) for node in generator.choice(3600, 2, replace=False))
-        angle = math.acos(position[start] @ position[goal])
+        angle = math.acos(position[start, 0] @ position[goal, 0])
         cost = graph.shortest_path(start, goal).cost
         assert 0.9999 * angle <= cost <= 1.001 * anisotropy * angle  # chords are shorter than arcs
 
 
-def test_obstacles_that_are_gone_leave_the_weights_as_they_were_to_the_last_bit():
-    graph, generator = random_graph(), np.random.default_rng(0)
+@pytest.mark.parametrize("blocks", [1, 3])
+def test_obstacles_that_are_gone_leave_the_weights_as_they_were_to_the_last_bit(blocks):
+    graph, generator = random_graph(blocks=blocks), np.random.default_rng(0)
     before = graph.weights.copy()
     for _ in range(5):
         feel_at_random(graph, generator)
@@ -139,6 +157,26 @@ def test_closed_nodes_are_on_no_path_until_they_are_opened():
     assert graph.shortest_path(corner, other).cost == free.cost
 
 
+@pytest.mark.filterwarnings("error")
+def test_shut_nodes_are_on_no_path_until_obstacles_are_put_anew():
+    graph, other = random_graph(points=10), random_graph(points=10)
+    felt = np.arange(30, 60), np.full((1, 30), 3.0), np.full(30, 0.9)
+    graph.feel(*felt)
+    found = graph.shortest_path(0, 99)
+    inner = found.nodes[1:-1]
+    graph.shut(inner[:2])
+    graph.shut(inner[2:])  # also those shut before stay so
+    around = graph.shortest_path(0, 99, found)
+    assert around.exists and around.cost > found.cost
+    assert not np.isin(around.nodes, inner).any() and not graph.is_free(inner).any()
+    assert np.isinf(graph.weights[np.isin(graph.edges, inner).any(axis=1)]).all()
+    for put in (felt, NONE):
+        for one in (graph, other):
+            one.feel(*put)
+        np.testing.assert_array_equal(graph.weights, other.weights)
+    assert graph.is_free(np.arange(100)).all()
+
+
 def test_closing_and_obstacles_do_not_undo_each_other():
     graph = random_graph()
     closed = np.random.default_rng(1).random(graph.nodes) < 0.3
@@ -150,9 +188,10 @@ def test_closing_and_obstacles_do_not_undo_each_other():
     assert np.isinf(weights[closed[graph.edges].any(axis=1)]).all()
 
 
+@pytest.mark.parametrize("blocks", [1, 2])
 @pytest.mark.parametrize("batch", range(4))
-def test_a_guess_changes_nothing_but_the_speed(batch):
-    graph, generator = random_graph(batch, 10), np.random.default_rng(batch)
+def test_a_guess_changes_nothing_but_the_speed(batch, blocks):
+    graph, generator = random_graph(batch, 10, blocks=blocks), np.random.default_rng(batch)
     last: GraphPath | None = None
     start, goal = 0, graph.nodes - 1
     graph.close(generator.random(graph.nodes) < 0.3)
@@ -203,7 +242,7 @@ def test_whole_open_edges_keep_the_clearance(seed):
     grid = LatentGrid(np.zeros(2), np.ones(2), 15)
     bent = np.column_stack([grid.nodes, np.sin(3 * grid.nodes[:, 0]) + 0.3 * generator.random(225)])
     travel = np.linalg.norm(np.diff(bent[grid.edges], axis=1)[:, 0], axis=1)
-    graph = GeodesicGraph(grid, bent, np.zeros((225, 1)), np.ones(225), travel)
+    graph = GeodesicGraph(grid, bent[:, None], np.zeros((225, 1)), np.ones(225), travel)
     clearance_m, opened, closed = 0.05, 0, 0
     for _ in range(10):
         centres, radii = bent[generator.choice(225, 3)] + 0.1, generator.uniform(0.05, 0.3, 3)
@@ -211,7 +250,7 @@ def test_whole_open_edges_keep_the_clearance(seed):
         def distance(points: np.ndarray, centres=centres, radii=radii) -> np.ndarray:
             return (np.linalg.norm(points[..., None, :] - centres, axis=-1) - radii).min(axis=-1)
 
-        graph.feel(np.arange(225), np.ones(225), distance(bent) - clearance_m)
+        graph.feel(np.arange(225), np.ones((1, 225)), distance(bent) - clearance_m)
         is_open = np.isfinite(graph.weights)
         ends = bent[grid.edges[is_open]]
         along = generator.random((50, len(ends), 1))
@@ -222,7 +261,7 @@ def test_whole_open_edges_keep_the_clearance(seed):
 
 def test_more_travel_closes_edges_and_less_opens_them():
     _, graph = flat_graph()
-    graph.feel(np.arange(graph.nodes), np.ones(graph.nodes), np.full(graph.nodes, 0.03))
+    graph.feel(np.arange(graph.nodes), np.ones((1, graph.nodes)), np.full(graph.nodes, 0.03))
     travel = graph.travel_m
     assert np.isfinite(graph.weights[travel < 0.06]).all() and np.isinf(graph.weights[travel > 0.06]).all()
     graph.set_travel(2 * travel)
@@ -231,16 +270,17 @@ def test_more_travel_closes_edges_and_less_opens_them():
     assert np.isfinite(graph.weights).all()
 
 
-@pytest.mark.parametrize(("points", "dim"), [(100, 2), (30, 3)])
-def test_a_graph_takes_no_more_memory_than_was_estimated(points, dim):
-    graph = random_graph(points=points, dim=dim)
-    estimate = memory_bytes(points, dim)
+@pytest.mark.parametrize(("points", "dim", "blocks"), [(100, 2, 1), (30, 3, 1), (30, 3, 8), (20, 3, 30)])
+def test_a_graph_takes_no_more_memory_than_was_estimated(points, dim, blocks):
+    graph = random_graph(points=points, dim=dim, blocks=blocks)
+    estimate = memory_bytes(points, dim, blocks)
     assert 0.2 * estimate < graph.memory_bytes <= estimate
 
 
 def test_arrays_of_other_lengths_are_refused():
     grid = LatentGrid(np.zeros(2), np.ones(2), 3)
-    arrays = {"position": np.zeros((9, 3)), "rest": np.zeros((9, 4)), "conformal": np.ones(9), "travel_m": np.zeros(20)}
+    position, rest = np.zeros((9, 1, 3)), np.zeros((9, 4))
+    arrays = {"position": position, "rest": rest, "conformal": np.ones(9), "travel_m": np.zeros(20)}
     for name in arrays:
         with pytest.raises(ShapeMismatch, match=f"{name} of a geodesic graph"):
             GeodesicGraph(grid, **(arrays | {name: arrays[name][:-1]}))

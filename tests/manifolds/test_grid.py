@@ -1,6 +1,5 @@
 """Latent grids: neighbours, interpolation, and memory asked for before it is taken."""
 
-import time
 import tracemalloc
 
 import numpy as np
@@ -81,12 +80,11 @@ def test_a_grid_around_points_has_the_wanted_margin():
 
 def test_a_grid_too_large_for_memory_is_refused_before_anything_is_allocated():
     tracemalloc.start()
-    begun = time.perf_counter()
     with pytest.raises(TooLargeForMemory) as refused:
         require_memory(10**6, 3, 4 * GIB)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert time.perf_counter() - begun < 1 and peak < 1e6
+    assert peak < 1e6
     needed = memory_bytes(10**6, 3)
     assert refused.value.needed_bytes == needed
     assert f"1000000^3 nodes would need about {needed / GIB:.3g} GiB, the limit is 4 GiB" in str(refused.value)

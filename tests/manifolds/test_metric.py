@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import torch
+from torch.func import jacrev, vmap
 from torch.testing import assert_close
 
 from geomotion.errors import ShapeMismatch
@@ -58,17 +59,34 @@ def test_a_conformal_factor_counts_twice(random_decoder):
     assert_close(weighted(z), (1 + z.square().sum(dim=-1)).square()[:, None, None] * PullbackMetric(decoder)(z))
 
 
-def test_an_obstacle_only_adds_acts_on_positions_alone_and_is_not_felt_far_away(random_decoder):
-    decoder, z = random_decoder(), latent(60)
-    positions = decoder.position(z)
-    plain, at_rest = PullbackMetric(decoder)(z), obstacle(positions[0])
+def test_blocks_add_up_each_weighed_by_the_factor_at_its_own_position(random_decoder):
+    decoder, z = random_decoder(positions=2), latent(60)
+    *of_positions, of_rest = (vmap(jacrev(network))(z) for network in decoder.networks)
+    factors = torch.rand(60, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(3)) * 50 + 1
+    expected = sum(m[:, None, None] * J.mT @ J for m, J in zip(factors.T, of_positions, strict=True))
+    expected = expected + of_rest.mT @ of_rest
+    places = decoder.positions(z)
+
+    def at_places(positions: torch.Tensor) -> torch.Tensor:
+        assert_close(positions, places)
+        return factors
+
+    assert_close(PullbackMetric(decoder, ambient=at_places)(z), expected)
+
+
+@pytest.mark.parametrize("positions", [1, 2, 5])
+def test_an_obstacle_only_adds_acts_on_positions_alone_and_is_not_felt_far_away(random_decoder, positions):
+    decoder, z = random_decoder(positions=positions), latent(60)
+    places = decoder.positions(z)
+    plain, at_rest = PullbackMetric(decoder)(z), obstacle(places[0, 0])
     added = PullbackMetric(decoder, ambient=at_rest)(z) - plain
     assert torch.linalg.eigvalsh(added).min() >= -1e-12
     assert torch.linalg.eigvalsh(added)[0, -1] > 10
-    decoder.networks[1] = lambda z: torch.zeros_like(z)
-    of_position = PullbackMetric(decoder)(z)
-    assert_close(added, (at_rest(positions) - 1)[:, None, None] * of_position)
-    assert_close(PullbackMetric(decoder, ambient=obstacle(positions[0] + 10))(z), of_position, rtol=0, atol=0)
+    decoder.networks[-1] = lambda z: torch.zeros_like(z)
+    of_positions = PullbackMetric(decoder)(z)
+    one_by_one = vmap(jacrev(decoder.positions))(z)
+    assert_close(added, ((at_rest(places) - 1)[..., None, None] * (one_by_one.mT @ one_by_one)).sum(dim=1))
+    assert_close(PullbackMetric(decoder, ambient=obstacle(places[0, 0] + 10))(z), of_positions, rtol=0, atol=0)
 
 
 @pytest.mark.parametrize("batch", [(), (3,), (2, 3)])
@@ -92,10 +110,15 @@ def test_the_length_of_chords_converges_to_that_of_the_metric_at_second_order(ra
     velocity = torch.stack([1 + 0.9 * (3 * t).cos(), -2 * (2 * t).sin()], dim=-1)
     speed = torch.einsum("pi,pij,pj->p", velocity, PullbackMetric(decoder)(curve(t)), velocity).sqrt()
     exact = (speed * weights).sum() / 2  # Eq. (2.3)
+
+    def side_by_side(points: torch.Tensor) -> torch.Tensor:
+        position, rest = decoder.blocks(points)
+        return torch.cat([position.flatten(-2), rest], dim=-1)
+
     errors = []
     for count in (21, 41, 81):
         points = curve(torch.linspace(0, 1, count).double())
-        errors.append(float(exact - curve_length(torch.cat(decoder.blocks(points), dim=-1))))  # Eq. (2.2)
+        errors.append(float(exact - curve_length(side_by_side(points))))  # Eq. (2.2)
     assert all(error > 0 for error in errors)
     assert math.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.05)
     assert math.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.02)

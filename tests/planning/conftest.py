@@ -9,8 +9,9 @@ import torch
 from torch import Tensor
 
 from geomotion.manifolds.grid import LatentGrid
+from geomotion.planning.ends import Anchors
 from geomotion.planning.manifold import DecodedPath, SkillManifold, Surface
-from geomotion.planning.planner import Anchors, Planner, PlannerSettings
+from geomotion.planning.planner import Planner, PlannerSettings
 from geomotion.scores.paths import PosePath
 from geomotion.scores.pose_support import PoseSupport
 
@@ -30,11 +31,11 @@ class Strip:
         nothing = torch.zeros_like(s)
         quaternion = torch.stack([(angle / 2).cos(), nothing, nothing, (angle / 2).sin()], dim=-1)
         outside = (c.abs() - HALF_WIDTH_M).clamp(min=0) / HALF_WIDTH_M
-        return position / SCALE_M, torch.cat([quaternion, 50 * outside[..., None]], dim=-1)
+        return position[..., None, :] / SCALE_M, torch.cat([quaternion, 50 * outside[..., None]], dim=-1)
 
     def decode(self, z: np.ndarray) -> DecodedPath:
         position, rest = self.embed(z)
-        return DecodedPath(PosePath(position * SCALE_M, rest[:, :4]), z[:, 0])
+        return DecodedPath(PosePath(position[:, 0] * SCALE_M, rest[:, :4]), z[:, 0])
 
     def embed(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         position, rest = self.blocks(torch.from_numpy(z))
@@ -44,15 +45,24 @@ class Strip:
         return self.conformal(torch.from_numpy(z)).numpy()
 
     def embedding(self, z: Tensor) -> Tensor:
-        return torch.cat(self.blocks(z), dim=-1)
+        position, rest = self.blocks(z)
+        return torch.cat([position.flatten(-2), rest], dim=-1)
 
     def conformal(self, z: Tensor) -> Tensor:
         return 1 + (z[..., 1] / HALF_WIDTH_M).square()
 
+    def allows(self, states: PosePath) -> np.ndarray:
+        return np.ones(len(states), dtype=bool)
+
+    def separation(self, states: PosePath, one: PosePath) -> np.ndarray:
+        across = np.linalg.norm(states.position_m - one.position_m, axis=1) / SCALE_M
+        cosine = np.abs(states.orientation @ one.orientation[0]).clip(max=1)
+        return np.sqrt(across**2 + 2 * (1 - cosine))
+
 
 def pose(s: float, c: float = 0.0) -> PosePath:
     """One pose on the strip."""
-    return Strip().decode(np.array([[s, c]])).poses
+    return Strip().decode(np.array([[s, c]])).states
 
 
 def demonstrations(without: tuple[float, float] = (2.0, 2.0)) -> list[PosePath]:
@@ -60,7 +70,7 @@ def demonstrations(without: tuple[float, float] = (2.0, 2.0)) -> list[PosePath]:
     shares = np.linspace(0, 1, 120)
     shares = shares[(shares < without[0]) | (shares > without[1])]
     across = np.linspace(-HALF_WIDTH_M, HALF_WIDTH_M, 5)
-    return [Strip().decode(np.column_stack([shares, np.full(len(shares), c)])).poses for c in across]
+    return [Strip().decode(np.column_stack([shares, np.full(len(shares), c)])).states for c in across]
 
 
 def make_planner(points_per_axis: int = 51, without: tuple[float, float] = (2.0, 2.0), **changes) -> Planner:

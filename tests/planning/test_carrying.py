@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from geomotion.planning.carrying import SHORTEST_PROGRESS, Offsets, blended, meet, of_vectors, vectors
+from geomotion.planning.carrying import SHORTEST_PROGRESS, Offsets, blended, meet
+from geomotion.scores.configurations import ConfigurationPath
 from geomotion.scores.paths import PosePath
 
 PROGRESS = np.linspace(0, 1, 40)
@@ -27,7 +28,7 @@ def ends(dim: int = 4) -> PosePath:
 
 
 def assert_same(one: PosePath, other: PosePath, atol: float = 1e-12) -> None:
-    np.testing.assert_allclose(vectors(one), vectors(other), atol=atol)
+    np.testing.assert_allclose(one.vectors, other.vectors, atol=atol)
 
 
 @pytest.mark.parametrize("dim", [3, 4])
@@ -101,10 +102,23 @@ def test_a_path_that_stays_in_one_place_is_led_from_start_to_goal():
     np.testing.assert_allclose(meet(still, wanted).position_m[:, 0], np.arange(5))
 
 
+def test_configurations_are_carried_joint_by_joint():
+    generator = np.random.default_rng(0)
+    joints, wanted = generator.normal(size=(40, 7)).cumsum(axis=0) / 10, generator.normal(size=(2, 7))
+    arm = ConfigurationPath(joints, lambda q: (q[:, :3], np.tile([1.0, 0, 0, 0], (len(q), 1))))
+    goals = arm.with_vectors(wanted)
+    offsets = Offsets.between(arm, goals, PROGRESS)
+    carried = offsets.carry(arm, PROGRESS)
+    expected = (1 - PROGRESS)[:, None] * (wanted[0] - joints[0]) + PROGRESS[:, None] * (wanted[1] - joints[-1])
+    np.testing.assert_allclose(carried.joints_rad, joints + expected)
+    np.testing.assert_allclose(offsets.undone(carried, PROGRESS).joints_rad, joints, atol=1e-12)
+    np.testing.assert_allclose(meet(arm, goals).joints_rad[[0, -1]], wanted)
+
+
 def test_vectors_and_poses_are_the_same_but_for_length_one():
     poses = path()
-    assert_same(of_vectors(vectors(poses), 3), poses)
-    stretched = of_vectors(vectors(poses) * np.array([1, 1, 1, 3, 3, 3, 3]), 3)
+    assert_same(poses.with_vectors(poses.vectors), poses)
+    stretched = poses.with_vectors(poses.vectors * np.array([1, 1, 1, 3, 3, 3, 3]))
     assert_same(stretched, poses)
     half = blended(poses, np.zeros(7), np.array([1.0, 0, 0, 0, 0, 0, 0]), np.full(40, 0.5))
     np.testing.assert_allclose(half.position_m - poses.position_m, np.tile([0.5, 0, 0], (40, 1)))

@@ -8,7 +8,7 @@ import torch
 
 from geomotion.obstacles.motion import ConstantVelocity, MovingBody, Waypoints
 from geomotion.obstacles.solids import Sphere
-from geomotion.planning.controller import BLEND, ControllerSettings, GeodesicController, steps_m
+from geomotion.planning.controller import BLEND, ControllerSettings, GeodesicController
 from geomotion.planning.obstruction import Constraint, Tool
 from geomotion.scores.paths import PosePath
 
@@ -23,7 +23,7 @@ def controller(planner, pose_on_strip):
     """Builds one that goes along the whole strip."""
 
     made, ends = (
-        planner(25, constraint=CONSTRAINT, tool=TOOL, samples=50),
+        planner(25, constraint=CONSTRAINT, shape=TOOL, samples=50),
         (pose_on_strip(0.0, 0.01), pose_on_strip(1.0)),
     )
 
@@ -45,7 +45,7 @@ def driven(
     controller: GeodesicController, bodies, end_s: float, begin_s: float = 0.0, stops: bool = False
 ) -> tuple[PosePath, float]:
     """The poses of all periods, or of those until it arrives, and the smallest distance to any obstacle [m]."""
-    poses, apart_m = [controller.pose], np.inf
+    poses, apart_m = [controller.state], np.inf
     for step in range(round(begin_s / PERIOD_S), round(end_s / PERIOD_S)):
         poses.append(controller.step(step * PERIOD_S, bodies))
         points_m = TOOL.points(poses[-1])[0]
@@ -64,7 +64,7 @@ def test_without_obstacles_it_follows_the_plan_at_the_pace_asked_for(controller,
 
     pilot = controller(pace)
     plan = pilot.planner.plan(pilot.query)
-    lengths_m, progress = steps_m(plan.path.poses), plan.path.progress
+    lengths_m, progress = plan.path.states.steps_m(), plan.path.progress
     needed_s = float((lengths_m / [pace((a + b) / 2) for a, b in pairwise(progress)]).sum())
     driven(pilot, [], 0.9 * needed_s)
     assert not pilot.arrived
@@ -80,13 +80,13 @@ def test_no_step_is_longer_than_the_pace_and_what_blends_two_ways(controller, po
     for bodies in ([], [crossing]):
         poses, _ = driven(controller(), bodies, 8.0)
         fastest_m = PERIOD_S * (ESCAPE_M_PER_S if bodies else PACE_M_PER_S)
-        assert steps_m(poses).max() <= fastest_m * (1 + 1 / BLEND) + 1e-6
+        assert poses.steps_m().max() <= fastest_m * (1 + 1 / BLEND) + 1e-6
 
 
 def test_a_ball_across_the_way_never_touches_it(controller, pose_on_strip):
     aimed = controller()
-    path = aimed.planner.plan(aimed.query).path.poses
-    behind_m = np.concatenate([[0.0], np.cumsum(steps_m(path))])
+    path = aimed.planner.plan(aimed.query).path.states
+    behind_m = np.concatenate([[0.0], np.cumsum(path.steps_m())])
     arrived = 0
     for seed in range(40):
         draw = np.random.default_rng(seed)
@@ -112,7 +112,7 @@ def test_it_waits_for_what_blocks_the_way_and_goes_on_when_that_has_gone(control
     poses, apart_m = driven(pilot, wall, 5.9)
     assert not pilot.arrived
     assert pilot.waited_s > 4
-    assert steps_m(poses)[-30:].max() == 0
+    assert poses.steps_m()[-30:].max() == 0
     _, apart_later_m = driven(pilot, wall, 14.0, 5.9, stops=True)
     assert pilot.arrived
     assert min(apart_m, apart_later_m) >= CONSTRAINT.clearance_m
@@ -124,7 +124,7 @@ def test_a_covered_goal_is_waited_for_at_a_distance(controller, pose_on_strip):
     poses, apart_m = driven(pilot, [body], 3.0)
     assert not pilot.arrived
     assert pilot.waited_s == pytest.approx(3.0)
-    assert steps_m(poses).max() == 0
+    assert poses.steps_m().max() == 0
     assert apart_m > CONSTRAINT.clearance_m
 
 

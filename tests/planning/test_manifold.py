@@ -15,7 +15,7 @@ def surface(planner) -> Surface:
 
 def test_every_node_has_what_the_manifold_says_there(planner, surface):
     strip, nodes = planner().manifold, surface.grid.nodes
-    np.testing.assert_array_equal(surface.decoded.poses.position_m, strip.decode(nodes).poses.position_m)
+    np.testing.assert_array_equal(surface.decoded.states.position_m, strip.decode(nodes).states.position_m)
     np.testing.assert_array_equal(surface.decoded.progress, nodes[:, 0])
     for found, expected in zip((surface.position, surface.rest), strip.embed(nodes), strict=True):
         np.testing.assert_array_equal(found, expected)
@@ -24,11 +24,10 @@ def test_every_node_has_what_the_manifold_says_there(planner, surface):
 
 def test_a_grid_decoded_in_parts_is_the_grid_decoded_at_once(planner, surface, monkeypatch):
     monkeypatch.setattr(module, "NODES_AT_ONCE", 100)
-    again = Surface.of(planner().manifold, surface.grid, PoseSupport.of([surface.decoded.poses[:50]]))
-    whole_m, whole_rad = PoseSupport.of([surface.decoded.poses[:50]]).distances(
-        surface.decoded.poses.position_m, surface.decoded.poses.orientation
-    )
-    np.testing.assert_array_equal(again.decoded.poses.orientation, surface.decoded.poses.orientation)
+    again = Surface.of(planner().manifold, surface.grid, PoseSupport.of([surface.decoded.states[:50]]))
+    whole = planner().manifold.decode(surface.grid.nodes).states
+    whole_m, whole_rad = PoseSupport.of([surface.decoded.states[:50]]).distances(whole)
+    np.testing.assert_array_equal(again.decoded.states.orientation, surface.decoded.states.orientation)
     np.testing.assert_array_equal(again.rest, surface.rest)
     np.testing.assert_array_equal(again.apart_m, whole_m)
     np.testing.assert_array_equal(again.apart_rad, whole_rad)

@@ -11,7 +11,7 @@ from geomotion.errors import ShapeMismatch
 from geomotion.manifolds.curves import curve_energy
 from geomotion.obstacles.motion import ConstantVelocity, MovingBody
 from geomotion.obstacles.solids import Box, Solid, Sphere
-from geomotion.planning.obstruction import Constraint, Tool, travel_m
+from geomotion.planning.obstruction import Constraint, Tool
 from geomotion.planning.plan import PlanStatus
 from geomotion.planning.planner import Planner, energy
 from geomotion.scores.paths import PosePath, orientation_angles
@@ -65,7 +65,7 @@ def test_the_free_way_follows_the_middle_of_the_strip(planner, pose_on_strip):
     found = planner()
     plan = found.plan(found.query(start, goal))
     assert plan.found and plan.status is PlanStatus.found and plan.reason == "found"
-    assert_meets(plan.path.poses, start, goal)
+    assert_meets(plan.path.states, start, goal)
     assert np.abs(plan.codes[:, 1]).max() < 0.02
     assert (np.diff(plan.path.progress) > -1e-9).all()
     exact = np.sqrt((np.pi * 0.5) ** 2 + 0.1**2) / 0.5, np.pi / 2
@@ -74,7 +74,7 @@ def test_the_free_way_follows_the_middle_of_the_strip(planner, pose_on_strip):
     assert plan.scores.clearance_m == np.inf
     assert plan.scores.apart_m < 0.02 and plan.scores.apart_rad < 0.1
     assert plan.scores.energy == pytest.approx(energy(found.manifold, plan.codes))
-    assert len(plan.codes) == len(plan.path.poses) == found.settings.samples
+    assert len(plan.codes) == len(plan.path.states) == found.settings.samples
 
 
 @pytest.mark.parametrize(("start_c", "goal_c"), [(0.02, -0.02), (0.08, -0.09)])
@@ -84,7 +84,7 @@ def test_starts_and_goals_beside_the_demonstrated_ones_are_met_exactly(planner, 
     found = planner()
     plan = found.plan(found.query(lifted, goal))
     assert plan.found
-    assert_meets(plan.path.poses, lifted, goal)
+    assert_meets(plan.path.states, lifted, goal)
     assert plan.scores.start_residual_m >= 0.009
 
 
@@ -93,32 +93,32 @@ def test_the_sign_of_a_quaternion_makes_no_difference(planner, pose_on_strip):
     other = PosePath(goal.position_m, -goal.orientation)
     found = planner()
     plan, flipped = (found.plan(found.query(start, one)) for one in (goal, other))
-    np.testing.assert_array_equal(plan.path.poses.orientation, flipped.path.poses.orientation)
+    np.testing.assert_array_equal(plan.path.states.orientation, flipped.path.states.orientation)
 
 
 def test_known_latent_points_are_taken_as_they_are(planner, pose_on_strip):
     found = planner()
     codes = np.array([[0.2, 0.08]]), np.array([[0.8, -0.08]])
-    plan = found.plan(found.query(*(found.pose_at(code[0]) for code in codes), codes))
+    plan = found.plan(found.query(*(found.state_at(code[0]) for code in codes), codes))
     grid = found.surface.grid
     np.testing.assert_array_equal(grid.nearest(plan.codes[[0, -1]]), grid.nearest(np.concatenate(codes)))
-    assert_meets(plan.path.poses, pose_on_strip(0.2, 0.08), pose_on_strip(0.8, -0.08))
+    assert_meets(plan.path.states, pose_on_strip(0.2, 0.08), pose_on_strip(0.8, -0.08))
     with pytest.raises(ShapeMismatch, match="2 coordinates, found 3"):
-        found.pose_at(np.zeros(3))
+        found.state_at(np.zeros(3))
 
 
 def test_the_way_back_is_the_way_there(planner, pose_on_strip):
     found, ends = planner(), (pose_on_strip(0.0, 0.06), pose_on_strip(1.0, -0.06))
     there, back = found.plan(found.query(*ends)), found.plan(found.query(*ends[::-1]))
     assert back.found and back.scores.graph_length == pytest.approx(there.scores.graph_length)
-    assert_meets(back.path.poses, *ends[::-1])
+    assert_meets(back.path.states, *ends[::-1])
 
 
 def test_start_and_goal_in_one_place_are_a_path_of_one_place(planner, pose_on_strip):
     found = planner()
     plan = found.plan(found.query(pose_on_strip(0.5), pose_on_strip(0.5)))
     assert plan.found and plan.scores.length == 0
-    np.testing.assert_allclose(plan.path.poses.position_m, np.tile(pose_on_strip(0.5).position_m, (200, 1)))
+    np.testing.assert_allclose(plan.path.states.position_m, np.tile(pose_on_strip(0.5).position_m, (200, 1)))
 
 
 @pytest.mark.parametrize("steps", [5, 40])
@@ -128,7 +128,7 @@ def test_refinement_never_raises_the_energy(planner, pose_on_strip, steps):
 
     def energy_of(planner: Planner, bodies: list[MovingBody]) -> float:
         query = planner.query(*ends)
-        codes = torch.from_numpy(planner.fit(query, planner.search(query, bodies, 0.0, 0.0)).codes)
+        codes = torch.from_numpy(planner.fit(query, planner.search(query, bodies, 0.0)).codes)
         return float(curve_energy(planner.manifold.embedding(codes), planner.manifold.conformal(codes)))
 
     assert energy_of(other, []) < energy_of(one, [])
@@ -140,7 +140,7 @@ def test_refinement_never_raises_the_energy(planner, pose_on_strip, steps):
 # ---------------------------------------------------------------- obstacles
 @pytest.mark.parametrize("tool", [Tool(), BOTTLE], ids=["point", "bottle"])
 def test_hard_obstacles_are_kept_clear_of_or_named(planner, pose_on_strip, tool):
-    found = planner(tool=tool, constraint=HARD)
+    found = planner(shape=tool, constraint=HARD)
     query = found.query(pose_on_strip(0.0), pose_on_strip(1.0, 0.02))
     generator, kept, refused = np.random.default_rng(0), 0, []
     for _ in range(100):
@@ -151,7 +151,7 @@ def test_hard_obstacles_are_kept_clear_of_or_named(planner, pose_on_strip, tool)
         plan = found.plan(query, bodies)
         if plan.found:
             kept += 1
-            clearance = true_clearance(plan.path.poses, bodies, tool)
+            clearance = true_clearance(plan.path.states, bodies, tool)
             assert clearance >= CLEARANCE_M
             assert plan.scores.clearance_m <= clearance + 1e-9
             nearest = found.surface.grid.nearest(plan.codes)
@@ -169,7 +169,7 @@ def test_hard_obstacles_are_kept_clear_of_or_named(planner, pose_on_strip, tool)
 
 
 def test_where_a_stiff_spline_cuts_corners_the_way_is_led_farther_around(planner, pose_on_strip):
-    found = planner(points_per_axis=101, tool=BOTTLE, constraint=HARD, control_points=5)
+    found = planner(points_per_axis=101, shape=BOTTLE, constraint=HARD, control_points=5)
     query = found.query(pose_on_strip(0.0), pose_on_strip(1.0, 0.02))
     generator, cut = np.random.default_rng(0), 0
     for _ in range(60):
@@ -177,20 +177,20 @@ def test_where_a_stiff_spline_cuts_corners_the_way_is_led_farther_around(planner
         for number in range(generator.integers(1, 4)):
             near = pose_on_strip(generator.uniform(0.1, 0.9), generator.uniform(-0.12, 0.12))
             bodies.append(sphere_at(near, float(generator.uniform(0.01, 0.07)), f"ball {number}"))
-        first = found.fit(query, found.search(query, bodies, 0.0, 0.0))
-        cut += true_clearance(first.path.poses, bodies, BOTTLE) < CLEARANCE_M
+        first = found.fit(query, found.search(query, bodies, 0.0))
+        cut += true_clearance(first.path.states, bodies, BOTTLE) < CLEARANCE_M
         plan = found.plan(query, bodies)
-        assert plan.found and true_clearance(plan.path.poses, bodies, BOTTLE) >= CLEARANCE_M
+        assert plan.found and true_clearance(plan.path.states, bodies, BOTTLE) >= CLEARANCE_M
     assert cut > 0
 
 
 @pytest.mark.parametrize("samples", [10, 40, 400])
 def test_the_stated_clearance_holds_between_the_samples_of_a_path(planner, pose_on_strip, samples):
-    found = planner(samples=samples, constraint=HARD, tool=BOTTLE)
+    found = planner(samples=samples, constraint=HARD, shape=BOTTLE)
     obstacle = sphere_at(pose_on_strip(0.5, 0.09), 0.05)
     plan = found.plan(found.query(pose_on_strip(0.0), pose_on_strip(1.0)), [obstacle])
     assert plan.found
-    clearance = true_clearance(plan.path.poses, [obstacle], BOTTLE)
+    clearance = true_clearance(plan.path.states, [obstacle], BOTTLE)
     assert plan.scores.clearance_m <= clearance + 1e-9
     assert plan.scores.clearance_m >= clearance - 0.002
 
@@ -214,7 +214,7 @@ def test_a_soft_constraint_finds_a_way_and_says_how_clear_it_is(planner, pose_on
         found = planner(constraint=Constraint(CLEARANCE_M, False, gain))
         plan = found.plan(found.query(*ends), [obstacle])
         assert plan.found
-        assert plan.scores.clearance_m <= true_clearance(plan.path.poses, [obstacle], Tool()) + 1e-9
+        assert plan.scores.clearance_m <= true_clearance(plan.path.states, [obstacle], Tool()) + 1e-9
         clearances.append(plan.scores.clearance_m)
     assert clearances[0] < 0 < clearances[1]
     thick = wall(0.3, 0.7)
@@ -230,12 +230,12 @@ def test_a_moving_obstacle_counts_where_it_is_and_where_it_gets_to(planner, pose
     query = found.query(pose_on_strip(0.0), pose_on_strip(1.0))
     for time_s in (0.0, 0.9, 1.0):
         plan = found.plan(query, [moving], time_s)
-        assert plan.found and true_clearance(plan.path.poses, [moving], Tool(), time_s) >= CLEARANCE_M
+        assert plan.found and true_clearance(plan.path.states, [moving], Tool(), time_s) >= CLEARANCE_M
     ahead = planner(constraint=replace(HARD, horizon_s=1.0))
     plan = ahead.plan(ahead.query(pose_on_strip(0.0), pose_on_strip(1.0)), [moving], 0.0)
     assert plan.found
     for time_s in np.linspace(0, 1, 30):
-        assert true_clearance(plan.path.poses, [moving], Tool(), time_s) >= CLEARANCE_M
+        assert true_clearance(plan.path.states, [moving], Tool(), time_s) >= CLEARANCE_M
 
 
 # ---------------------------------------------------------------- several queries on one graph
@@ -248,21 +248,25 @@ def test_queries_made_before_are_planned_as_if_they_were_made_last(planner, pose
         (shifted, pose_on_strip(0.3, 0.132), (None, beside)),
     ]
     bodies = [sphere_at(pose_on_strip(0.5, 0.05), 0.05)]
-    found = planner(constraint=HARD, tool=BOTTLE)
+    found = planner(constraint=HARD, shape=BOTTLE)
     queries = [found.query(*one) for one in asked]
     for query, one in zip(queries, asked, strict=True):
-        alone = planner(constraint=HARD, tool=BOTTLE)
+        alone = planner(constraint=HARD, shape=BOTTLE)
         expected = alone.plan(alone.query(*one), bodies)
         plan = found.plan(query, bodies)
         np.testing.assert_array_equal(found.graph.weights, alone.graph.weights)
-        np.testing.assert_array_equal(found.graph.travel_m, travel_m(query.poses, found.surface.grid.edges, BOTTLE))
-        np.testing.assert_array_equal(plan.path.poses.position_m, expected.path.poses.position_m)
+        edges = found.surface.grid.edges
+        usable = query.is_open[edges].all(axis=1)
+        np.testing.assert_array_equal(found.graph.travel_m[usable], BOTTLE.travel_m(query.states, edges[usable]))
+        assert np.isinf(found.graph.weights[~usable]).all() and (found.graph.travel_m[~usable] == 0).all()
+        assert query.longest_travel_m == found.graph.travel_m.max()
+        np.testing.assert_array_equal(plan.path.states.position_m, expected.path.states.position_m)
 
 
 def test_obstacles_of_the_last_plan_do_not_choose_the_next_goal(planner, pose_on_strip):
     ends = pose_on_strip(0.0), pose_on_strip(0.8, 0.05)
     found, fresh = planner(constraint=HARD), planner(constraint=HARD)
-    found.search(found.query(*ends), [sphere_at(ends[1], 0.005)], 0.0, 0.0)
+    found.search(found.query(*ends), [sphere_at(ends[1], 0.005)], 0.0)
     assert not found.graph.is_free(np.array([fresh.query(*ends).goal]))[0]
     assert found.query(*ends).goal == fresh.query(*ends).goal
     assert found.plan(found.query(*ends)).found

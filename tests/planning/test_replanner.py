@@ -26,24 +26,24 @@ def ball_across(pose_on_strip) -> MovingBody:
 
 def test_replanning_gives_the_plan_that_a_fresh_planner_makes(planner, pose_on_strip, ball_across):
     ends = pose_on_strip(0.0, 0.02), pose_on_strip(1.0)
-    replanner = Replanner(planner(constraint=HARD, tool=TOOL), *ends)
+    replanner = Replanner(planner(constraint=HARD, shape=TOOL), *ends)
     lengths = []
     for time_s in TIMES_S:
         curve = replanner.replan([ball_across], time_s)
-        fresh = planner(constraint=HARD, tool=TOOL)
+        fresh = planner(constraint=HARD, shape=TOOL)
         plan = fresh.plan(fresh.query(*ends), [ball_across], time_s)
         assert plan.found
         np.testing.assert_allclose(curve.graph_length, plan.scores.graph_length, rtol=1e-12)
-        np.testing.assert_allclose(curve.path.poses.position_m, plan.path.poses.position_m, atol=1e-9)
+        np.testing.assert_allclose(curve.path.states.position_m, plan.path.states.position_m, atol=1e-9)
         lengths.append(curve.graph_length)
     assert max(lengths) > 1.05 * min(lengths)
     assert lengths[0] == pytest.approx(lengths[-1])
 
 
 def test_every_replanned_path_keeps_the_clearance(planner, pose_on_strip, ball_across):
-    replanner = Replanner(planner(constraint=HARD, tool=TOOL), pose_on_strip(0.0), pose_on_strip(1.0, -0.05))
+    replanner = Replanner(planner(constraint=HARD, shape=TOOL), pose_on_strip(0.0), pose_on_strip(1.0, -0.05))
     for time_s in TIMES_S:
-        poses = replanner.replan([ball_across], time_s).path.poses.resampled(4000)
+        poses = replanner.replan([ball_across], time_s).path.states.resampled(4000)
         points = TOOL.points(poses)
         apart = np.linalg.norm(points - ball_across.centre_m(time_s), axis=2) - 0.04 - TOOL.radii_m
         assert apart.min() >= HARD.clearance_m
@@ -53,12 +53,13 @@ def test_a_path_goes_on_from_where_the_robot_is(planner, pose_on_strip, ball_acr
     replanner = Replanner(planner(constraint=HARD), pose_on_strip(0.0), pose_on_strip(1.0))
     curve = replanner.replan([ball_across], 0.0)
     for time_s, place in ((0.2, 40), (0.4, 90), (0.6, 60)):
-        poses = curve.path.poses
+        poses = curve.path.states
         node, here = replanner.node_at(curve.codes[place]), poses[place : place + 1]
         curve = replanner.replan([ball_across], time_s, node, here)
-        np.testing.assert_allclose(curve.path.poses.position_m[0], here.position_m[0], atol=1e-12)
-        np.testing.assert_allclose(curve.path.poses.position_m[-1], pose_on_strip(1.0).position_m[0], atol=1e-12)
-        exact = replanner.planner.search(replanner.planner.onward(replanner.query, node), [ball_across], time_s, 0.0)
+        np.testing.assert_allclose(curve.path.states.position_m[0], here.position_m[0], atol=1e-12)
+        np.testing.assert_allclose(curve.path.states.position_m[-1], pose_on_strip(1.0).position_m[0], atol=1e-12)
+        onward = replanner.planner.ends.onward(replanner.query, node)
+        exact = replanner.planner.search(onward, [ball_across], time_s)
         assert curve.graph_length == pytest.approx(exact.cost, rel=1e-12)
 
 
@@ -66,7 +67,7 @@ def test_without_a_pose_a_path_begins_at_its_node(planner, pose_on_strip):
     replanner = Replanner(planner(), pose_on_strip(0.0, 0.01), pose_on_strip(1.0))
     node = replanner.node_at(np.array([0.4, 0.0]))
     curve = replanner.replan([], 0.0, node)
-    np.testing.assert_allclose(curve.path.poses.position_m[0], replanner.query.poses.position_m[node], atol=1e-12)
+    np.testing.assert_allclose(curve.path.states.position_m[0], replanner.query.states.position_m[node], atol=1e-12)
 
 
 def test_a_quaternion_of_the_other_sign_is_the_same_pose(planner, pose_on_strip):
@@ -75,7 +76,7 @@ def test_a_quaternion_of_the_other_sign_is_the_same_pose(planner, pose_on_strip)
     curves = [
         replanner.replan([], 0.0, node, PosePath(here.position_m, sign * here.orientation)) for sign in (1.0, -1.0)
     ]
-    np.testing.assert_allclose(*(curve.path.poses.orientation for curve in curves))
+    np.testing.assert_allclose(*(curve.path.states.orientation for curve in curves))
 
 
 def test_a_blocked_way_is_no_path_and_opens_again(planner, pose_on_strip):

@@ -11,9 +11,12 @@ DEMO_S = 1000 / 60
 
 @pytest.fixture
 def scene():
-    from geomotion.robot.scene import PandaScene
+    from geomotion.robot import panda
+    from geomotion.robot.panda_arm import panda_arm
+    from geomotion.robot.scene import ArmScene
 
-    with PandaScene() as scene:
+    with ArmScene(panda_arm(), panda.GRIPPER, table=True) as scene:
+        scene.set_joints(panda.HOME_RAD)
         yield scene
 
 

@@ -55,7 +55,7 @@ def test_a_target_is_approached_without_overshooting():
     for period_s in (1 / 240, 1 / 60, 1 / 20):
         joints, velocity = np.zeros(7), np.zeros(7)
         for _ in range(round(2.0 / period_s)):
-            velocity = approach_velocity(joints, velocity, goal, goal, period_s)
+            velocity = approach_velocity(joints, velocity, goal, goal, period_s, panda.LIMITS)
             joints = joints + period_s * velocity
             assert (np.sign(goal) * (joints - goal) < 1e-12).all()
         np.testing.assert_allclose(joints, goal, atol=1e-9)

@@ -34,6 +34,20 @@ def test_arm_obstacles_and_path_are_visible(scene):
     assert (drawn[:, 2] > drawn[:, 0]).mean() > 0.9  # blue
 
 
+@pytest.mark.parametrize("height_m", [0.0, 0.3])
+def test_a_camera_sees_all_of_what_it_is_put_around(height_m):
+    random = np.random.default_rng(0)
+    moved_m, resting_m = random.uniform(-0.5, 0.5, (50, 3)) * [1, 1, height_m], random.uniform(0.2, 0.6, (5, 3))
+    camera = Camera.around(moved_m, resting_m)
+    eye = np.array(camera.eye_m)
+    away = np.array(camera.target_m) - eye
+    sight = np.concatenate([moved_m, resting_m]) - eye
+    cosine = sight @ away / np.linalg.norm(sight, axis=1) / np.linalg.norm(away)
+    assert np.degrees(np.arccos(cosine)).max() < camera.view_deg / 2
+    steep = -away[2] / np.linalg.norm(away)
+    assert (steep > 0.7) == (height_m == 0)  # what moves in a level plane is seen from above
+
+
 def test_nothing_collides_with_a_drawn_path(scene):
     tip, _ = scene.end_effector_pose()
     draw_path(scene, np.tile(tip, (5, 1)))

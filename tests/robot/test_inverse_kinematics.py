@@ -26,7 +26,7 @@ def test_the_simulated_arm_is_where_the_path_says(recorded, scene):
     path = solve_path(positions, orientations, "grasp_target")
     for index in (0, 77, 199):
         scene.set_joints(path.joints_rad[index])
-        found, turned = scene.end_effector_pose("grasp_target")
+        found, turned = scene.end_effector_pose()
         np.testing.assert_allclose(found, positions[index], atol=1e-6)
         assert abs(turned @ orientations[index]) == pytest.approx(1, abs=1e-6)
 

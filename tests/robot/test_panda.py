@@ -13,18 +13,18 @@ def surface_in_frame(scene, frame: panda.Frame) -> np.ndarray:
     """Points on the collision shapes of hand and fingers, which are convex, in a frame of the arm [m]."""
     import trimesh
 
-    client, found = scene.client, []
+    client, simulated, found = scene.client, scene.simulated, []
     for link in HAND_LINKS:
-        for shape in client.getCollisionShapeData(scene.arm, scene.link_index[link]):
+        for shape in client.getCollisionShapeData(simulated.body, simulated.link_index[link]):
             *_, scale, file, place, turn = shape
-            state = client.getLinkState(scene.arm, scene.link_index[link], computeForwardKinematics=1)
+            state = client.getLinkState(simulated.body, simulated.link_index[link], computeForwardKinematics=1)
             at, turned = client.multiplyTransforms(state[0], state[1], place, turn)
             hull = trimesh.load(file.decode(), force="mesh").convex_hull
             sampled, _ = trimesh.sample.sample_surface(hull, 3000, seed=0)
             points_m = np.concatenate([hull.vertices, sampled]) * scale
             found.append(Rotation.from_quat(turned).apply(points_m) + at)
-    position_m, wxyz = scene.end_effector_pose(frame)
-    return Rotation.from_quat(wxyz, scalar_first=True).inv().apply(np.concatenate(found) - position_m)
+    position_m, xyzw = simulated.link_pose(panda.FRAME_LINKS[frame])
+    return Rotation.from_quat(xyzw).inv().apply(np.concatenate(found) - position_m)
 
 
 @pytest.mark.parametrize("frame", ["grasp_target", "flange"])

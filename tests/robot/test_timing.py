@@ -24,10 +24,10 @@ def late(count: int = 50) -> np.ndarray:
 
 
 MOTIONS = {
-    "calm": lambda: like_demonstration(arc(), EVEN, CALM_S),
-    "hasty": lambda: like_demonstration(arc(), late(), HASTY_S),
-    "fastest": lambda: fastest(arc()),
-    "careful": lambda: fastest(arc(), share_of_limits=0.3),
+    "calm": lambda: like_demonstration(arc(), EVEN, CALM_S, LIMITS),
+    "hasty": lambda: like_demonstration(arc(), late(), HASTY_S, LIMITS),
+    "fastest": lambda: fastest(arc(), LIMITS),
+    "careful": lambda: fastest(arc(), LIMITS, share_of_limits=0.3),
 }
 
 
@@ -80,17 +80,17 @@ def test_velocity_and_acceleration_are_derivatives_of_the_positions(kind):
 
 
 def test_a_calm_demonstration_keeps_its_duration_and_its_timing():
-    motion = like_demonstration(arc(), EVEN, CALM_S)
+    motion = like_demonstration(arc(), EVEN, CALM_S, LIMITS)
     assert motion.stretch == pytest.approx(1)
     assert motion.duration_s == pytest.approx(CALM_S, abs=1 / RATE_HZ)
     assert max(motion.use.velocity, motion.use.acceleration, motion.use.jerk) < 1
-    delayed = like_demonstration(arc(), late(), CALM_S)
+    delayed = like_demonstration(arc(), late(), CALM_S, LIMITS)
     for time_share, share in ((0.3, 0.0), (0.55, 0.5), (0.8, 1.0)):
         assert np.interp(time_share * CALM_S, delayed.time_s, delayed.share_of_path) == pytest.approx(share, abs=0.03)
 
 
 def test_a_hasty_demonstration_is_stretched_by_no_more_than_it_must():
-    motion = like_demonstration(arc(), late(), HASTY_S)
+    motion = like_demonstration(arc(), late(), HASTY_S, LIMITS)
     assert motion.stretch > 2
     assert motion.duration_s == pytest.approx(motion.stretch * HASTY_S)
     # 1/240 s less, the rounding, and one of the limits would be exceeded
@@ -99,34 +99,34 @@ def test_a_hasty_demonstration_is_stretched_by_no_more_than_it_must():
 
 
 def test_the_fastest_motion_uses_a_limit_fully_and_little_time_more_than_without_jerk_limits():
-    motion = fastest(arc())
+    motion = fastest(arc(), LIMITS)
     assert motion.use.stretch > 0.98
     assert 1 <= motion.stretch < 1.1  # of toppra's optimum under limits of velocity and acceleration alone
-    assert motion.duration_s < like_demonstration(arc(), EVEN, HASTY_S).duration_s
+    assert motion.duration_s < like_demonstration(arc(), EVEN, HASTY_S, LIMITS).duration_s
 
 
 def test_more_rows_of_the_same_path_make_little_difference():
-    assert fastest(arc(1500)).duration_s == pytest.approx(fastest(arc(60)).duration_s, rel=0.03)
+    assert fastest(arc(1500), LIMITS).duration_s == pytest.approx(fastest(arc(60), LIMITS).duration_s, rel=0.03)
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_recorded_tasks_have_a_fastest_motion_within_limits(task, recorded):
-    motion = fastest(solve_path(*recorded(task)).joints_rad)
+    motion = fastest(solve_path(*recorded(task)).joints_rad, LIMITS)
     assert motion.use.stretch == pytest.approx(1, abs=0.01)
     assert 3 < motion.duration_s < 10
     assert motion.stretch < 1.6
 
 
 def test_more_careful_is_slower():
-    durations = [fastest(arc(), share_of_limits=share).duration_s for share in (1.0, 0.5, 0.2)]
+    durations = [fastest(arc(), LIMITS, share_of_limits=share).duration_s for share in (1.0, 0.5, 0.2)]
     assert all(slower > 1.2 * faster for faster, slower in pairwise(durations))
 
 
 @pytest.mark.parametrize("where", [0, 30, 59])
 def test_the_fastest_motion_does_not_wait_where_rows_repeat(where):
     waiting = np.insert(arc(), [where] * 10, arc()[where], axis=0)
-    assert fastest(waiting).duration_s < 1.5 * fastest(arc()).duration_s
-    np.testing.assert_allclose(fastest(waiting).joints_rad[[0, -1]], arc()[[0, -1]], atol=1e-12)
+    assert fastest(waiting, LIMITS).duration_s < 1.5 * fastest(arc(), LIMITS).duration_s
+    np.testing.assert_allclose(fastest(waiting, LIMITS).joints_rad[[0, -1]], arc()[[0, -1]], atol=1e-12)
 
 
 def test_stretching_divides_by_powers():
@@ -145,19 +145,19 @@ def test_the_share_of_a_path_counts_metres_and_radians():
 
 def test_what_has_no_timing_is_refused():
     with pytest.raises(ShapeMismatch, match="four rows"):
-        fastest(arc()[:3])
+        fastest(arc()[:3], LIMITS)
     with pytest.raises(InvalidSetting, match="path that moves"):
-        fastest(np.tile(arc()[:1], (10, 1)))
+        fastest(np.tile(arc()[:1], (10, 1)), LIMITS)
     with pytest.raises(InvalidSetting, match="NaN"):
-        like_demonstration(np.full((10, 7), np.nan), EVEN, CALM_S)
+        like_demonstration(np.full((10, 7), np.nan), EVEN, CALM_S, LIMITS)
     with pytest.raises(InvalidSetting, match="a time above 0 s"):
-        like_demonstration(arc(), EVEN, 0.0)
+        like_demonstration(arc(), EVEN, 0.0, LIMITS)
     for shares in (EVEN[::-1].copy(), EVEN[1:], np.array([0.0, 0.7, 0.3, 1.0])):
         with pytest.raises(InvalidSetting, match="rise from 0 to 1"):
-            like_demonstration(arc(), shares, CALM_S)
+            like_demonstration(arc(), shares, CALM_S, LIMITS)
     with pytest.raises(ShapeMismatch, match="two samples"):
-        like_demonstration(arc(), np.zeros(1), CALM_S)
+        like_demonstration(arc(), np.zeros(1), CALM_S, LIMITS)
     with pytest.raises(InvalidSetting, match="limit_share"):
-        fastest(arc(), share_of_limits=0.0)
+        fastest(arc(), LIMITS, share_of_limits=0.0)
     with pytest.raises(InvalidSetting, match="all in one place"):
         share_of_path(np.zeros((3, 3)), np.tile([1.0, 0, 0, 0], (3, 1)))

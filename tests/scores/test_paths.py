@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 from geomotion.errors import InvalidSetting, ShapeMismatch
 from geomotion.scores.curves import dtwd_per_point
 from geomotion.scores.paths import (
+    LEVER_M,
+    MotionPath,
     PosePath,
     dimensionless_jerk,
     dtwd_ratio,
@@ -81,6 +83,53 @@ def test_the_angle_between_directions_is_that_between_the_vectors():
     np.testing.assert_allclose(orientation_angles(directions[:1], directions)[0], angles, atol=1e-14)
 
 
+# ---------------------------------------------------------------- poses as vectors
+@pytest.mark.parametrize("coordinates", [3, 4])
+def test_vectors_are_the_same_poses_whatever_the_length_of_their_orientations(coordinates):
+    path = pose_path(1, 20, coordinates)
+    assert isinstance(path, MotionPath)
+    assert path.vectors.shape == (20, 3 + coordinates)
+    lengths = np.random.default_rng(0).uniform(0.5, 2, size=(20, 1))
+    longer = np.column_stack([path.position_m, lengths * path.orientation])
+    for values in (path.vectors, longer):
+        again = path.with_vectors(values)
+        np.testing.assert_array_equal(again.position_m, path.position_m)
+        np.testing.assert_allclose(again.orientation, path.orientation, atol=1e-15)
+    assert len(path.with_vectors(path.vectors[3:8])) == 5
+
+
+def test_signs_are_those_of_known_quaternions_and_directions_have_none():
+    path = pose_path(1)
+    found = with_random_signs(path).with_signs_of(path)
+    np.testing.assert_array_equal(found.vectors, path.vectors)
+    direction = PosePath(np.zeros((1, 3)), np.array([[0.0, 0, 1]]))
+    opposite = PosePath(np.zeros((1, 3)), np.array([[0.0, 0, -1]]))
+    np.testing.assert_array_equal(opposite.with_signs_of(direction).vectors, opposite.vectors)
+
+
+@pytest.mark.parametrize("coordinates", [3, 4])
+def test_residuals_are_the_distances_and_angles_of_one_pose_to_one(coordinates):
+    one, other = pose_path(1, 30, coordinates), pose_path(2, 30, coordinates)
+    apart_m, apart_rad = one.residuals(other)
+    np.testing.assert_allclose(apart_m, np.linalg.norm(one.position_m - other.position_m, axis=1))
+    np.testing.assert_allclose(apart_rad, np.diag(orientation_angles(one.orientation, other.orientation)))
+    if coordinates == 4:
+        np.testing.assert_allclose(with_random_signs(one).residuals(other)[1], apart_rad, atol=1e-14)
+    for values in one.residuals(one):
+        np.testing.assert_array_equal(values, 0)
+
+
+def test_steps_count_turning_by_a_lever():
+    angles = np.linspace(0, 1, 200)
+    turning = Rotation.from_rotvec(np.stack([0 * angles, angles, 0 * angles], axis=1)).as_quat(scalar_first=True)
+    still, along = np.zeros((200, 3)), np.linspace([0.0, 0, 0], [0, 0, 0.3], 200)
+    one_way = np.tile(turning[:1], (200, 1))
+    np.testing.assert_allclose(PosePath(still, turning).steps_m().sum(), LEVER_M, rtol=1e-5)
+    np.testing.assert_allclose(PosePath(along, one_way).steps_m().sum(), 0.3)
+    np.testing.assert_allclose(PosePath(along, turning).steps_m().sum(), np.hypot(0.3, LEVER_M), rtol=1e-5)
+
+
+# ---------------------------------------------------------------- distances
 def test_a_path_that_stays_a_distance_aside_scores_that_distance_twice():
     one = PosePath(np.linspace([0.0, 0, 0], [1, 0, 0], 20), np.tile([1.0, 0, 0, 0], (20, 1)))
     turned = np.tile(Rotation.from_rotvec([0, 0.2, 0]).as_quat(scalar_first=True), (20, 1))

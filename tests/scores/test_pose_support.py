@@ -20,7 +20,7 @@ def poses(count: int, seed: int = 0, coordinates: int = 4) -> tuple[np.ndarray, 
 def test_distances_are_those_of_brute_force(count, coordinates):
     position_m, orientation = poses(count, coordinates=coordinates)
     asked_m, asked = poses(50, seed=1, coordinates=coordinates)
-    found_m, found_rad = PoseSupport(position_m, orientation).distances(asked_m, asked)
+    found_m, found_rad = PoseSupport(position_m, orientation).distances(PosePath(asked_m, asked))
     apart = cdist(asked_m, position_m)
     np.testing.assert_allclose(found_m, apart.min(axis=1))
     nearest = np.argsort(apart, axis=1)[:, :20]
@@ -30,7 +30,7 @@ def test_distances_are_those_of_brute_force(count, coordinates):
 
 def test_demonstrated_poses_are_at_distance_zero_whatever_the_sign_of_their_quaternions():
     position_m, orientation = poses(100)
-    in_m, in_rad = PoseSupport(position_m, orientation).distances(position_m, -orientation)
+    in_m, in_rad = PoseSupport(position_m, orientation).distances(PosePath(position_m, -orientation))
     assert in_m.max() == 0
     assert in_rad.max() < 1e-7
 
@@ -38,7 +38,8 @@ def test_demonstrated_poses_are_at_distance_zero_whatever_the_sign_of_their_quat
 def test_orientations_that_occur_far_away_do_not_count():
     position_m = np.repeat([[0.0, 0, 0], [1.0, 0, 0]], 30, axis=0)
     orientation = np.repeat([[1.0, 0, 0, 0], [0.0, 1, 0, 0]], 30, axis=0)
-    _, apart_rad = PoseSupport(position_m, orientation).distances(np.zeros((1, 3)), orientation[-1:])
+    elsewhere = PosePath(np.zeros((1, 3)), orientation[-1:])
+    _, apart_rad = PoseSupport(position_m, orientation).distances(elsewhere)
     np.testing.assert_allclose(apart_rad, np.pi)
 
 

@@ -8,7 +8,8 @@ import pytest
 from geomotion.planning.manifold import DecodedPath
 from geomotion.planning.plan import PathScores, Plan, PlanStatus
 from geomotion.planning.planner import Planner
-from geomotion.scores.paths import PosePath, dtwd_ratio
+from geomotion.scores.configurations import ConfigurationPath, ConfigurationSupport, joint_dtwd
+from geomotion.scores.paths import MotionPath, PosePath, dtwd_ratio
 from geomotion.scores.pose_support import PoseSupport
 from geomotion.stages.evaluate_geodesics import Judged, score
 
@@ -22,7 +23,7 @@ def bow(height_m: float, turn_rad: float = 0.0, points: int = 50) -> PosePath:
     return PosePath(position, np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1))
 
 
-def judged(path: PosePath | None, others: list[PosePath], demonstration: PosePath) -> Judged:
+def judged(path: MotionPath | None, others: list[MotionPath], demonstration: MotionPath) -> Judged:
     if path is None:
         plan = Plan(PlanStatus.blocked, "obstacles", np.zeros((0, 2)))
     else:
@@ -36,8 +37,8 @@ class Settings:
 
 
 class OnlyItsSupport(Planner):
-    def __init__(self, paths):
-        self.support, self.settings = PoseSupport.of(paths), Settings()
+    def __init__(self, paths, kind=PoseSupport):
+        self.support, self.settings = kind.of(paths), Settings()
 
 
 def names(*ones: Judged):
@@ -49,7 +50,33 @@ def test_the_ratio_is_that_of_the_scores():
     one = judged(bow(0.25, 0.1), [bow(0.3, 0.3), bow(0.1, -0.2)], bow(0.2))
     expected = dtwd_ratio(bow(0.25, 0.1), bow(0.2), one.others)
     found = one.ratio(bow(0.25, 0.1))
-    assert (found.position, found.orientation) == pytest.approx((expected.position, expected.orientation))
+    assert found == pytest.approx({"position": expected.position, "orientation": expected.orientation})
+
+
+def bends(height_rad: float, points: int = 50) -> ConfigurationPath:
+    """Two joints, of which the first turns the hand about the origin, and the second changes nothing."""
+    share = np.linspace(0, 1, points)
+
+    def kinematics(joints_rad: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        angle, none = joints_rad[:, 0], np.zeros(len(joints_rad))
+        position = np.stack([np.cos(angle), np.sin(angle), none], axis=1)
+        return position, np.stack([np.cos(angle / 2), none, none, np.sin(angle / 2)], axis=1)
+
+    return ConfigurationPath(np.stack([share, height_rad * np.sin(np.pi * share)], axis=1), kinematics)
+
+
+def test_configurations_are_judged_in_their_joints_too():
+    one = judged(bends(0.25), [bends(0.3), bends(0.1)], bends(0.2))
+    between = [joint_dtwd(bends(0.2), other) for other in one.others]
+    found = one.ratio(bends(0.25))
+    assert found["joint"] == pytest.approx(joint_dtwd(bends(0.25), bends(0.2)) / np.mean(between))
+    assert np.isnan([found["position"], found["orientation"]]).all()  # the hand moves the same way in all of them
+    evaluation = score(OnlyItsSupport([one.demonstration], ConfigurationSupport), [one], "heldout")
+    assert evaluation.scores["heldout.joint_dtwd_ratio"].value == pytest.approx(found["joint"])
+    of_averaged = one.ratio(one.averaged)["joint"]
+    assert evaluation.scores["heldout.joint_dtwd_ratio_of_averaged_demo"].value == pytest.approx(of_averaged)
+    assert set(evaluation.omitted) == {"heldout.position_dtwd_ratio", "heldout.orientation_dtwd_ratio"}
+    np.testing.assert_array_equal(evaluation.arrays["geodesic_3_joints_rad"], bends(0.25).joints_rad)
 
 
 def test_a_part_in_which_demonstrations_do_not_differ_is_left_out_with_the_reason():

@@ -5,11 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from geomotion import config as schema
 from geomotion.demos import readers, storage
 from geomotion.demos.demonstrations import Demonstrations
 from geomotion.errors import TooLargeForMemory
+from geomotion.manifolds.grid import LatentGrid
+from geomotion.manifolds.grid_metric import metric_on_grid
+from geomotion.manifolds.metric import PullbackMetric
 from geomotion.stages.graph import (
     LEAST_CAP_RAD,
     LEAST_CAP_SHARE,
@@ -37,7 +41,9 @@ def build(tmp_path_factory):
         storage.save(demonstrations, root / "ingest")
         inputs = {"ingest": Artefacts("ingest", "0", root / "ingest", "")}
         manifold = replace(MANIFOLD, latent_dim=latent_dim)
-        training = TrainManifoldConfig(schema.DatasetConfig("generated/jc"), manifold, TRAINING, 0)
+        training = TrainManifoldConfig(
+            schema.DatasetConfig("generated/jc"), manifold, TRAINING, 0, None, schema.PandaArm()
+        )
         for name, stage, settings in (
             ("train", train_manifold, training),
             ("graph", graph, GraphStageConfig(config, METRIC)),
@@ -65,15 +71,27 @@ def test_planning_reads_the_surface_that_was_written(inputs):
     skilled = load_skilled(inputs, METRIC)
     assert len(skilled.surface.grid.nodes) == document(inputs)["nodes"] == 15**2
     again = skilled.manifold.decode(skilled.surface.grid.nodes)
-    np.testing.assert_allclose(again.poses.position_m, skilled.surface.decoded.poses.position_m, atol=1e-12)
+    np.testing.assert_allclose(again.states.position_m, skilled.surface.decoded.states.position_m, atol=1e-12)
     assert [one.shape for one in skilled.maps] == [(15, 15)] * 2
     assert skilled.surface.grid.contains(skilled.manifold.all_codes).all()
 
 
-def test_three_dimensions_have_no_picture(build):
+def test_three_dimensions_have_an_interactive_picture_too(build):
     inputs = build(readers.read(JC), 3, schema.GraphConfig(points_per_axis=10))
     assert document(inputs)["nodes"] == 10**3
-    assert load_skilled(inputs, METRIC).maps is None
+    skilled = load_skilled(inputs, METRIC)
+    assert [one.shape for one in skilled.maps] == [(10, 10, 10)] * 2
+    assert (inputs["graph"].path("figures/latent.png")).stat().st_size > 0
+    assert "plotly" in inputs["graph"].path("latent.html").read_text()[:100_000].lower()
+
+
+def test_differences_come_to_the_exact_metric_of_a_trained_network_where_cells_are_small(inputs):
+    manifold = load_skilled(inputs, METRIC).manifold
+    middle = manifold.codes[0][10].numpy()
+    near = LatentGrid(middle - 0.005, middle + 0.005, 9)
+    found = metric_on_grid(near, *manifold.embed(near.nodes))
+    exact = PullbackMetric(manifold)(torch.from_numpy(near.nodes)).numpy()
+    np.testing.assert_allclose(found, exact, atol=0.01 * np.abs(exact).max())
 
 
 def test_crossing_starts_above_every_demonstration(inputs):
@@ -90,6 +108,6 @@ def test_demonstrations_that_are_alike_still_leave_room(build, count):
 
 
 def test_what_does_not_fit_is_refused_with_what_would(build):
-    with pytest.raises(TooLargeForMemory, match=r"20000\^2 nodes would need about 328 GiB.*=1104 fits"):
+    with pytest.raises(TooLargeForMemory, match=r"20000\^2 nodes would need about 355 GiB.*=1062 fits"):
         build(readers.read(JC), config=schema.GraphConfig(points_per_axis=20000, memory_limit_gib=1.0))
     assert memory_limit_bytes(schema.GraphConfig(memory_limit_gib=0.5)) == 2**29

@@ -15,9 +15,11 @@ from geomotion.demos.preprocessing import preprocess
 from geomotion.errors import DatasetError, InvalidSetting, MissingData
 from geomotion.obstacles.motion import ConstantVelocity, MovingBody
 from geomotion.obstacles.solids import Sphere
+from geomotion.planning.ends import Query
 from geomotion.planning.plan import Plan, PlanStatus
-from geomotion.planning.planner import Planner, Query
-from geomotion.robot.scene import PandaScene
+from geomotion.planning.planner import Planner
+from geomotion.robot.panda_arm import panda_arm
+from geomotion.robot.scene import ArmScene
 from geomotion.stages import planners
 from geomotion.stages.graph import GraphStageConfig, graph, load_skilled
 from geomotion.stages.plan import PlanStageConfig, make_plans, plan, plan_leg
@@ -51,7 +53,8 @@ def inputs(tmp_path_factory) -> dict[str, Artefacts]:
     storage.save(preprocess(readers.read(REACH), REACH.preprocess), root / "ingest")
     found = {"ingest": Artefacts("ingest", "0", root / "ingest", "")}
     selection = schema.DatasetConfig(REACH.name)
-    train_manifold(TrainManifoldConfig(selection, MANIFOLD, TRAINING, 0), found, run_in(root / "train"))
+    training = TrainManifoldConfig(selection, MANIFOLD, TRAINING, 0, None, schema.PandaArm())
+    train_manifold(training, found, run_in(root / "train"))
     found["train"] = Artefacts("train", "0", root / "train", "")
     graph(GraphStageConfig(schema.GraphConfig(points_per_axis=60), METRIC), found, run_in(root / "graph"))
     return found | {"graph": Artefacts("graph", "0", root / "graph", "")}
@@ -74,7 +77,7 @@ def free_m(planned) -> np.ndarray:
     """Positions of the geodesic in free space."""
     (found,) = planned().plans
     assert found.found
-    return found.path.poses.position_m
+    return found.path.states.position_m
 
 
 @pytest.fixture(scope="module")
@@ -128,11 +131,11 @@ class TestObstaclesOnTheWay:
         assert found.found, found.reason
         assert found.scores.clearance_m >= CLEARANCE_M
         (body,) = moving_bodies(obstacle, 3)
-        with PandaScene(table=False) as scene:
+        with ArmScene(panda_arm()) as scene:
             scene.add_obstacle(body.name, body.body, body.motion.offset(0.0))
             before, apart = (
                 [scene.probe_distance(point, body.name) for point in points]
-                for points in (free_m, found.path.poses.position_m)
+                for points in (free_m, found.path.states.position_m)
             )
         assert min(before) < CLEARANCE_M / 2  # the obstacle stood in the way
         assert min(apart) >= CLEARANCE_M - PYBULLET_EXACT_M
@@ -148,7 +151,7 @@ class TestObstaclesOnTheWay:
     @pytest.mark.parametrize(("key", "end"), [("start_covered", 0), ("goal_covered", -1)])
     def test_one_that_covers_an_end_is_named(self, planned, key, end):
         (free,) = planned().plans
-        (found,) = planned(sphere(free.path.poses.position_m[end], 0.02)).plans
+        (found,) = planned(sphere(free.path.states.position_m[end], 0.02)).plans
         assert found.status is PlanStatus[key]
         assert found.blocking == ("sphere",)
 
@@ -222,13 +225,13 @@ class TestPlaces:
     def test_via_points_make_legs_that_meet(self, planned):
         found = planned(start="demo:0", via=["demo:1"], goal="demo:2").plans
         assert [one.found for one in found] == [True, True]
-        first, second = (one.path.poses for one in found)
+        first, second = (one.path.states for one in found)
         np.testing.assert_allclose(first.position_m[-1], second.position_m[0], atol=1e-9)
 
     def test_ends_are_those_that_were_asked_for(self, planned, inputs):
         wanted = storage.load(inputs["ingest"].folder)[2].channels["position_m"]
         (found,) = planned(start="demo:2", goal="demo:2").plans
-        np.testing.assert_allclose(found.path.poses.position_m[[0, -1]], wanted[[0, -1]], atol=1e-9)
+        np.testing.assert_allclose(found.path.states.position_m[[0, -1]], wanted[[0, -1]], atol=1e-9)
 
 
 BROKEN_OBSTACLES = {

@@ -12,10 +12,11 @@ from geomotion.demos.preprocessing import preprocess
 from geomotion.errors import InvalidSetting
 from geomotion.files import write_json
 from geomotion.scores.paths import PosePath
+from geomotion.stages.execution import PATIENCE
 from geomotion.stages.graph import GraphStageConfig, graph, load_skilled
 from geomotion.stages.plan import PlanStageConfig, joined, make_plans
 from geomotion.stages.replan import make_pilot
-from geomotion.stages.replay import PATIENCE, ReplayStageConfig, replay, replay_table
+from geomotion.stages.replay import ReplayStageConfig, replay, replay_table
 from geomotion.stages.train_manifold import TrainManifoldConfig, train_manifold
 from geomotion.tracking import Artefacts, StageRun
 
@@ -37,8 +38,9 @@ def trained(dataset, folder, steps: int) -> dict[str, Artefacts]:
     storage.save(preprocess(readers.read(dataset), dataset.preprocess), folder / "ingest")
     inputs = {"ingest": Artefacts("ingest", "0", folder / "ingest", "")}
     training = schema.ManifoldTraining(steps=steps, spread_steps=10, restarts=0)
+    fit = TrainManifoldConfig(dataset, schema.ManifoldConfig(), training, 0, None, schema.PandaArm())
     stages = (
-        ("train", train_manifold, TrainManifoldConfig(dataset, schema.ManifoldConfig(), training, 0)),
+        ("train", train_manifold, fit),
         ("graph", graph, GraphStageConfig(schema.GraphConfig(points_per_axis=30), METRIC)),
     )
     for name, stage, config in stages:

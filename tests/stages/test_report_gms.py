@@ -41,7 +41,9 @@ GRAPH = {
 }
 REPLAY = {
     "executed": True,
-    "frame": "grasp_target",
+    "arm": "panda",
+    "states": "poses",
+    "frame": "panda_grasptarget",
     "timing": "demonstration",
     "duration_s": 7.5,
     "stretch": 1.2,
@@ -52,6 +54,7 @@ REPLAY = {
     "tracking_worst_m": 0.0021,
     "tracking_worst_rad": np.radians(0.4),
     "limit_margin_rad": np.radians(12.0),
+    "self_clearance": {"links": ["panda_link5", "panda_hand"], "distance_m": 0.042},
     "clearance_m": {"panda_link1": 0.1, "panda_link7": 0.031, "panda_hand": 0.023},
     "contacts": {},
     "closed_loop": False,
@@ -66,7 +69,13 @@ def leg(**changes):
 
 def plan(*legs, **changes):
     legs = legs or (leg(),)
-    document = {"start": "demo:7", "goal": "demo:7", "legs": list(legs), "obstacles": ["sphere"]}
+    document = {
+        "start": "demo:7",
+        "goal": "demo:7",
+        "legs": list(legs),
+        "obstacles": ["sphere"],
+        "protected": "the tool",
+    }
     return document | {"found": all(one["status"] == "found" for one in legs)} | changes
 
 
@@ -190,6 +199,14 @@ def test_page_carries_pictures_and_film_in_itself_and_links_to_the_scene_beside_
     assert not re.search(r"https?://|@import|url\(|<script|<link|<iframe", page)
 
 
+def test_a_latent_space_to_turn_lies_beside_the_page_where_there_is_one(stages, tmp_path):
+    inputs = stages()
+    (inputs["plan"].folder / "latent.html").write_bytes(b"<html>tubes</html>")
+    page = page_of(inputs, tmp_path)
+    assert 'href="latent.html"' in page
+    assert (tmp_path / "report/latent.html").read_text() == "<html>tubes</html>"
+
+
 def test_verdict_says_what_is_guaranteed_and_what_was_measured(stages, tmp_path):
     tone, text = verdict_of(page_of(stages(), tmp_path))
     assert tone == "found"
@@ -205,6 +222,32 @@ def test_verdict_says_what_is_guaranteed_and_what_was_measured(stages, tmp_path)
         assert expected in text
     guaranteed, measured = text.index("Guaranteed clearance"), text.index("Measured only")
     assert guaranteed < measured
+
+
+def test_a_path_of_configurations_is_told_by_links_and_joints(stages, tmp_path):
+    checks = {
+        "obstacles": ["sphere"],
+        "clearances": [{"bodies": ["panda_link4", "sphere"], "distance_m": 0.017, "row": 88}],
+        "self_clearance": {"bodies": ["panda_link2", "panda_link4"], "distance_m": 0.068, "row": 3},
+        "limit": {"joint": "panda_joint4", "margin_rad": np.radians(21), "row": 120},
+        "up_to_m": 0.2,
+        "looks": 700,
+    }
+    planned = plan(leg(checks=checks), protected="every link of the arm")
+    replayed = REPLAY | {"states": "configurations", "limit_margin_rad": None, "self_clearance": None}
+    page = page_of(stages(planned, replayed), tmp_path)
+    tone, text = verdict_of(page)
+    assert tone == "found"
+    for expected in (
+        "every link of the arm stays at least 12.3 mm away",
+        "no link comes nearer to an obstacle than 17 mm (panda_link4 to sphere)",
+        "come nearer to each other than 68 mm (panda_link2 to panda_link4)",
+        "every joint stays 21° or more inside its limits (panda_joint4 comes nearest)",
+        "its joints have no limits",
+    ):
+        assert expected in text
+    assert "panda_joint4 to its limit 21° 120" in text_of(page)
+    assert "inverse kinematics" not in text_of(page)
 
 
 def test_no_path_is_an_answer_with_the_reason_and_the_obstacle(stages, tmp_path):
@@ -233,6 +276,10 @@ def test_no_path_is_an_answer_with_the_reason_and_the_obstacle(stages, tmp_path)
                 "reached_share": 0.995,
             },
             "cannot take 1 of the poses (0.5 %); at worst, at pose 41, 30 mm",
+        ),
+        (
+            {"self_clearance": {"links": ["panda_link1", "panda_hand"], "distance_m": -0.012}},
+            "panda_link1 and panda_hand overlap by 12 mm",
         ),
         ({"closed_loop": True, "replans": 40, "replan_median_ms": 3.2, "reached_goal": False}, "it did not arrive"),
     ],
@@ -307,8 +354,8 @@ def test_without_held_out_demonstrations_training_ones_are_judged_and_that_is_sa
 def test_without_robot_the_page_says_why(stages, tmp_path):
     page = page_of(stages(replayed=None), tmp_path)
     tone, text = verdict_of(page)
-    assert tone == "found" and "It was not executed: the demonstrations are not poses in R³×S³" in text
-    assert "On the robot no robot: the demonstrations are not poses in R³×S³" in text_of(page)
+    assert tone == "found" and "It was not executed: the demonstrations are neither poses in R³×S³" in text
+    assert "On the robot no robot: the demonstrations are neither poses in R³×S³" in text_of(page)
     assert "PyBullet" not in text_of(page) and "image/gif" not in page
 
 
@@ -330,7 +377,7 @@ def test_caveats_follow_from_the_run(stages, tmp_path):
         "mean of the demonstrations",
         "scaling of the metric",
         "PyBullet",
-        "The recordings give their frame as: base. The robot executed them as poses of its frame grasp_target",
+        "The recordings give their frame as: base. The robot executed them as poses of its frame panda_grasptarget",
     ):
         assert expected in text
     free = text_of(page_of(stages(plan(leg(scores=LEG | {"clearance_m": None}), obstacles=[])), tmp_path))

@@ -26,14 +26,14 @@ from geomotion.tracking import Artefacts, StageRun
 
 SHORT = [
     "graph.points_per_axis=80",
-    "training.steps=1200",
+    "training.steps=900",
     "training.spread_steps=300",
     "training.restarts=0",
     "training.batch_points=256",
 ]
 JC = [*SHORT, "manifold.kernels=300", "dataset.demos=8"]
 RECORDED = [*SHORT, "manifold.points=100"]
-POURING = [*SHORT, "training.steps=1500", "dataset.demos=12", "dataset.points=80", "manifold.points=80"]
+POURING = [*SHORT, "training.steps=1000", "dataset.demos=12", "dataset.points=80", "manifold.points=80"]
 
 
 def configured(figure: str, *overrides: str) -> schema.GmsConfig:
@@ -68,7 +68,7 @@ def trained(config: schema.GmsConfig, folder: Path) -> Trained:
     demonstrations = preprocess(readers.read(config.dataset), config.dataset.preprocess)
     storage.save(demonstrations, folder / "ingest")
     done = {"ingest": Artefacts("ingest", "0", folder / "ingest", "")}
-    fit = TrainManifoldConfig(config.dataset, config.manifold, config.training, config.seed)
+    fit = TrainManifoldConfig(config.dataset, config.manifold, config.training, config.seed, config.space, config.arm)
     train_manifold(fit, done, running(folder / "train"))
     done["train"] = Artefacts("train", "0", folder / "train", "")
     graph(GraphStageConfig(config.graph, config.metric), done, running(folder / "graph"))
@@ -104,7 +104,7 @@ def test_both_signs_of_an_orientation_make_two_clusters_that_the_kernels_keep_ap
     steps = max(float(np.linalg.norm(np.diff(codes.numpy(), axis=0), axis=1).max()) for codes in manifold.codes)
     assert apart.min() > 3 * steps
     assert apart.min() > 8 * float(manifold.network.concentration.bandwidth)
-    facing = manifold.decode(own).poses.orientation * manifold.decode(manifold.other_codes).poses.orientation
+    facing = manifold.decode(own).states.orientation * manifold.decode(manifold.other_codes).states.orientation
     assert facing.sum(axis=1).max() < -0.9
 
 
@@ -122,8 +122,7 @@ def test_riemannian_geodesic_stays_on_the_data_and_the_straight_line_does_not(le
     (plan,) = planned.plans
     assert plan.found and plan.scores.line_energy > 100 * plan.scores.energy
     line = np.linspace(plan.codes[0], plan.codes[-1], 200)
-    poses = planned.planner.manifold.decode(line).poses
-    apart_m, _ = planned.planner.support.distances(poses.position_m, poses.orientation)
+    apart_m, _ = planned.planner.support.distances(planned.planner.manifold.decode(line).states)
     assert apart_m.max() > 3 * plan.scores.apart_m
 
 
@@ -148,7 +147,7 @@ def test_a_geodesic_into_the_other_cluster_flips_the_quaternion_and_its_energy_g
     assert crossing.status is PlanStatus.crosses and not planned.found
     assert inside.status is PlanStatus.found
     assert crossing.scores.energy > 1000 * inside.scores.energy
-    flipped, kept = (one.path.poses.orientation for one in (crossing, inside))
+    flipped, kept = (one.path.states.orientation for one in (crossing, inside))
     np.testing.assert_allclose(flipped[0], kept[0], atol=1e-6)
     np.testing.assert_allclose(flipped[-1], -kept[-1], atol=1e-6)
 
@@ -157,13 +156,13 @@ def test_geodesics_inside_either_cluster_keep_the_sign_and_turn_the_hand(winegla
     planned = wineglass.planned(configured("fig_3_7", *RECORDED, wineglass_root))
     found = [*planned.plans, *(one for _, _, one in planned.others)]
     assert [one.status for one in found] == [PlanStatus.found] * 7
-    orientations = [one.path.poses.orientation for one in found]
+    orientations = [one.path.states.orientation for one in found]
     turns = [one[0] @ one[-1] for one in orientations]
     assert min(turns) > 0  # less than half a turn, and no flip
     assert np.degrees(2 * np.arccos(turns[0])) > 60
     sides = np.sign([one[0] @ orientations[0][0] for one in orientations])
     np.testing.assert_array_equal(sides, [1, 1, 1, 1, -1, -1, -1])
-    goals = np.stack([one.path.poses.position_m[-1] for one in found[:4]])
+    goals = np.stack([one.path.states.position_m[-1] for one in found[:4]])
     assert np.linalg.norm(goals[:, None] - goals, axis=2)[np.triu_indices(4, 1)].min() > 0.05
 
 
@@ -179,7 +178,7 @@ def test_all_nine_pairs_of_bottle_and_cup_are_planned_from_three_demonstrated_on
 def test_three_geodesics_in_a_row_pour_one_bottle_into_three_cups(pouring):
     planned = pouring.planned(configured("fig_3_9", *POURING))
     assert [one.status for one in planned.plans] == [PlanStatus.found] * 3
-    ends = [one.path.poses.position_m[[0, -1]] for one in planned.plans]
+    ends = [one.path.states.position_m[[0, -1]] for one in planned.plans]
     for (_, before), (after, _) in pairwise(ends):
         np.testing.assert_allclose(before, after, atol=1e-6)
     across = [leg[-1][0] for leg in ends]
@@ -191,13 +190,13 @@ def test_a_geodesic_is_replanned_around_the_sphere_where_it_is_at_two_times_and_
     planner = planners.planner(pouring.skilled, config.planning, config.robot.frame)
     path = pose_paths(pouring.demonstrations, 100)[0]
     query, bodies = planner.query(path[:1], path[-1:]), moving_bodies(config.obstacle, 3)
-    undisturbed = planner.fit(query, planner.search(query, (), 0.0, 0.0))
+    undisturbed = planner.fit(query, planner.search(query, (), 0.0))
     detours_m = []
     for time_s in (0.0, 2.0):
         plan = planner.plan(query, bodies, time_s)
-        assert planner.clearance(query, undisturbed, bodies, time_s) < config.planning.clearance_m
+        assert planner.clearances(undisturbed, bodies, time_s).min() < config.planning.clearance_m
         assert plan.scores.clearance_m >= config.planning.clearance_m
-        apart = cdist(plan.path.poses.position_m, undisturbed.path.poses.position_m)
+        apart = cdist(plan.path.states.position_m, undisturbed.path.states.position_m)
         detours_m.append(apart.min(axis=1).max())
     assert 0.01 < detours_m[0] < detours_m[1]
     wider = replace(config.planning, tool_radius_m=config.planning.tool_radius_m + 0.1)

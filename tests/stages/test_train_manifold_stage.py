@@ -18,7 +18,7 @@ JC = schema.JCDataset(name="generated/jc", demos=5, points=40)
 LETTERS = schema.LettersDataset(name="letters/s", letter="s", demos=3, points=40)
 MANIFOLD = schema.ManifoldConfig(kernels=30, hidden_units=[16, 8], points=20)
 TRAINING = schema.ManifoldTraining(steps=12, spread_steps=6, restarts=0, log_every_steps=1)
-CONFIG = TrainManifoldConfig(schema.DatasetConfig("generated/jc"), MANIFOLD, TRAINING, 0)
+CONFIG = TrainManifoldConfig(schema.DatasetConfig("generated/jc"), MANIFOLD, TRAINING, 0, None, schema.PandaArm())
 
 
 @pytest.fixture
@@ -40,7 +40,8 @@ def test_the_manifold_can_be_read_and_every_loss_is_kept(train):
     folder = train(readers.read(JC))
     skill = manifold_models.load(folder / "model.pt")
     assert (skill.train_demos, skill.test_demos) == ((0, 1, 2), (3, 4))
-    assert skill.config == MANIFOLD
+    assert skill.config == replace(MANIFOLD, latent_dim=2)
+    assert skill.arm is None
     for name, rows in (("training", 12), ("spreads", 6)):
         assert len((folder / f"{name}.csv").read_text().splitlines()) == 1 + rows
     training = json.loads((folder / "training.json").read_text())
@@ -66,5 +67,5 @@ def test_positions_that_stay_are_refused_even_where_rounding_moves_them(train):
 
 def test_more_kernels_than_poses_are_refused(train):
     few = replace(CONFIG, manifold=replace(MANIFOLD, kernels=1000))
-    with pytest.raises(DatasetError, match=r"poses to train on, fewer than manifold\.kernels=1000"):
+    with pytest.raises(DatasetError, match=r"points to train on, fewer than manifold\.kernels=1000"):
         train(readers.read(JC), few)

@@ -7,7 +7,7 @@ import pytest
 from geomotion.config import TrackingConfig
 from geomotion.errors import CorruptArtefact, DiskFull, Interrupted, MissingArtefact, MissingRun, StoreUnavailable
 from geomotion.files import atomic
-from geomotion.tracking import Stage, Tracker, store
+from geomotion.tracking import Artefacts, Stage, Tracker, store
 from geomotion.tracking.artefacts import digest_of, run_key
 
 
@@ -197,6 +197,8 @@ class TestLineage:
     def test_a_missing_file_names_the_stage_to_repeat(self, config):
         with pytest.raises(MissingArtefact, match="ncds train reuse=false"):
             execute(config, Stage("train", Counting()), {}).path("model.pt")
+        with pytest.raises(MissingArtefact, match="gms eval reuse=false"):
+            Artefacts("evaluate", "0", Path(config.root), "", "gms").path("scores.json")
 
 
 class TestStore:

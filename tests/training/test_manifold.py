@@ -21,14 +21,16 @@ from geomotion.errors import DatasetError, Interrupted
 from geomotion.networks.pose_vae import DecodedPose, PoseVAE
 from geomotion.networks.von_mises_fisher import antipodal_log_density, log_density
 from geomotion.scores.paths import PosePath
+from geomotion.training.kinds import Poses
 from geomotion.training.manifold import Health, PoseReconstruction, SpreadLikelihood, judge
 from geomotion.training.manifold_fit import FittedManifold, fit_manifold
-from geomotion.training.poses import PoseTrainingSet
+from geomotion.training.poses import PoseSpace, both_signs
+from geomotion.training.states import TrainingSet
 
 SETTINGS = ManifoldTraining(
     steps=30, batch_points=16, spread_steps=20, restarts=0, checkpoint_every_steps=7, log_every_steps=5, ramp_steps=5
 )
-CONFIG = ManifoldConfig(hidden_units=[8], kernels=6, mixed_copies=1, points=20)
+CONFIG = ManifoldConfig(latent_dim=2, hidden_units=[8], kernels=6, mixed_copies=1, points=20)
 
 
 def paths(demos: int = 3, points: int = 20) -> list[PosePath]:
@@ -41,12 +43,12 @@ def paths(demos: int = 3, points: int = 20) -> list[PosePath]:
     return found
 
 
-def data() -> PoseTrainingSet:
-    return PoseTrainingSet.of(paths(), [""] * 3, carry=False)
+def data() -> TrainingSet:
+    return TrainingSet.of(PoseSpace.of(paths()), paths(), [""] * 3, carry=False)
 
 
 def network(seed: int = 0, config: ManifoldConfig = CONFIG) -> PoseVAE:
-    model = manifold_models.build(config, data().geometry, seed)
+    model = manifold_models.build(config, data().space, seed)
     generator = torch.Generator().manual_seed(0)
     model.precision.place(torch.randn(config.kernels, 2, generator=generator), 1.0, 20.0)
     model.concentration.place(torch.randn(config.kernels, 2, generator=generator), 1.0, 500.0)
@@ -60,7 +62,7 @@ def ignore(step: int, values: object) -> None:
 # ---------------------------------------------------------------- objectives
 @pytest.mark.parametrize("antipodal", list(Antipodal))
 def test_means_are_fitted_by_the_weighted_evidence_bound(antipodal):
-    poses, progress = data().tensors(0, False, 0)
+    poses, progress = data().tensors(0, 0)
     settings = replace(SETTINGS, position_weight=2.0, orientation_weight=3.0, divergence_weight=0.5, warm_up=0.5)
     model = network()
     losses = PoseReconstruction(poses, progress, settings, antipodal)(model, 0.25, torch.Generator().manual_seed(4))
@@ -85,7 +87,7 @@ def test_means_are_fitted_by_the_weighted_evidence_bound(antipodal):
 
 
 def test_without_warm_up_the_divergence_counts_from_the_start():
-    poses, progress = data().tensors(0, False, 0)
+    poses, progress = data().tensors(0, 0)
     values = []
     for settings, share in ((replace(SETTINGS, warm_up=0.0), 0.0), (SETTINGS, 0.9), (SETTINGS, 0.0)):
         objective = PoseReconstruction(poses, progress, settings, Antipodal.aligned)
@@ -94,7 +96,7 @@ def test_without_warm_up_the_divergence_counts_from_the_start():
 
 
 def test_one_step_of_the_means_has_the_recorded_losses():
-    poses, progress = data().tensors(1, True, 0)
+    poses, progress = both_signs(*data().tensors(1, 0), position_dim=3)
     losses = PoseReconstruction(poses, progress, SETTINGS, Antipodal.doubled)(
         network(), 1.0, torch.Generator().manual_seed(0)
     )
@@ -105,7 +107,8 @@ def test_one_step_of_the_means_has_the_recorded_losses():
 
 @pytest.mark.parametrize("antipodal", list(Antipodal))
 def test_spreads_are_fitted_by_their_likelihood_and_leave_the_means_alone(antipodal):
-    poses, progress = data().tensors(0, antipodal is not Antipodal.aligned, 0)
+    poses, progress = Poses(data(), PoseSpace.of(paths()), antipodal).samples(0, 0)
+    assert len(poses) == 60 * (1 if antipodal is Antipodal.aligned else 2)
     model = network()
     losses = SpreadLikelihood(poses, progress, 16, antipodal)(model, 0.0, torch.Generator().manual_seed(4))
     generator = torch.Generator().manual_seed(4)
@@ -150,15 +153,15 @@ class Oracle(PoseVAE):
 
 
 def health(codes: torch.Tensor, collapsed: bool = False, sign: float = 1.0, antipodal=Antipodal.aligned) -> Health:
-    poses, progress = data().tensors(0, False, 0)
+    poses, progress = data().tensors(0, 0)
     shown = torch.cat([poses[:, :3], sign * poses[:, 3:]], dim=1)
     model = Oracle(shown, progress, codes, collapsed)
-    return judge(model, poses, progress, nearby=0.05, antipodal=antipodal)
+    return judge(model, poses, progress, 0.05, Poses(data(), PoseSpace.of(paths()), antipodal).orientation_at)
 
 
 def tube(folded: bool) -> torch.Tensor:
     """Codes of the demonstrations, along a line; folded, the way back lies on the way there."""
-    _, progress = data().tensors(0, False, 0)
+    _, progress = data().tensors(0, 0)
     along = (0.5 - (progress - 0.5).abs()) * 2 if folded else progress
     beside = torch.arange(3).repeat_interleave(20) * 0.05 + 0.02 * (progress > 0.5)
     return torch.stack([4 * along, beside], dim=1)
@@ -197,7 +200,7 @@ def train(
     checkpoint: Path, log=ignore, seed: int = 0, training: ManifoldTraining = SETTINGS, **changes
 ) -> FittedManifold:
     config = replace(CONFIG, **changes)
-    build = partial(manifold_models.build, config, data().geometry)
+    build = partial(manifold_models.build, config, data().space)
     return fit_manifold(data(), config, training, build, seed, checkpoint, log)
 
 
@@ -214,7 +217,7 @@ def test_training_lowers_both_losses_and_logs_them_one_after_the_other(tmp_path)
 
 def test_kernels_lie_among_the_codes(tmp_path):
     fitted = train(tmp_path / "checkpoint")
-    poses, progress = data().tensors(1, False, 0)
+    poses, progress = data().tensors(1, 0)
     codes = fitted.network.encode(poses, progress)[0].detach()
     centres = fitted.network.precision.centres
     assert torch.equal(centres, fitted.network.concentration.centres)
@@ -261,7 +264,7 @@ def test_a_bad_latent_space_is_tried_again_and_the_best_is_kept(tmp_path, caplog
 
 
 def test_fewer_poses_than_kernels_are_refused(tmp_path):
-    with pytest.raises(DatasetError, match=r"120 poses to train on, fewer than manifold\.kernels=500; lower it"):
+    with pytest.raises(DatasetError, match=r"120 points to train on, fewer than manifold\.kernels=500; lower it"):
         train(tmp_path / "checkpoint", kernels=500)
 
 
@@ -269,14 +272,14 @@ def test_fewer_poses_than_kernels_are_refused(tmp_path):
 def gap_in_spacings(antipodal: Antipodal, checkpoint: Path) -> float:
     """Latent distance from the codes of -q to the nearest of q, in median steps between neighbouring poses."""
     demonstrations = pose_paths(jc.generate(JCDataset(demos=4, points=100)), 60)
-    data = PoseTrainingSet.of(demonstrations, [""] * 4, carry=False)
-    config = ManifoldConfig(hidden_units=[40, 30], kernels=40, mixed_copies=0, antipodal=antipodal)
+    data = TrainingSet.of(PoseSpace.of(demonstrations), demonstrations, [""] * 4, carry=False)
+    config = ManifoldConfig(latent_dim=2, hidden_units=[40, 30], kernels=40, mixed_copies=0, antipodal=antipodal)
     training = ManifoldTraining(
-        steps=700, learning_rate=5e-3, batch_points=128, spread_steps=1, restarts=0, divergence_weight=0.01
+        steps=450, learning_rate=5e-3, batch_points=128, spread_steps=1, restarts=0, divergence_weight=0.01
     )
-    build = partial(manifold_models.build, config, data.geometry)
+    build = partial(manifold_models.build, config, data.space)
     model = fit_manifold(data, config, training, build, 0, checkpoint, ignore).network
-    poses, progress = data.tensors(0, True, 0)
+    poses, progress = both_signs(*data.tensors(0, 0), position_dim=demonstrations[0].position_m.shape[1])
     with torch.no_grad():
         codes, others = model.encode(poses, progress)[0].chunk(2)
     spacing = codes[:60].diff(dim=0).norm(dim=1).median()

@@ -1,4 +1,4 @@
-"""Demonstrated poses as a training set."""
+"""Poses as states: their place and size, and what q and -q come to."""
 
 import numpy as np
 import pytest
@@ -6,122 +6,65 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from geomotion.scores.paths import PosePath
-from geomotion.training.poses import PoseGeometry, PoseTrainingSet
+from geomotion.training.poses import PoseSpace, both_signs
+from geomotion.training.states import StateSpace
 
 POINTS = 40
-SHARES = np.linspace(0, 1, POINTS)
 
 
-def path(offset_m: float = 0.0, angle_rad: float = 0.0, slow: float = 0.0) -> PosePath:
-    """An arc beside others, turning on the way, slow at first."""
-    done = SHARES - slow * np.sin(2 * np.pi * SHARES) / (2 * np.pi)
+def path(offset_m: float = 0.0, angle_rad: float = 0.0) -> PosePath:
+    """An arc beside others, turning on the way."""
+    done = np.linspace(0, 1, POINTS)
     position = np.stack([done, np.sin(3 * done) + offset_m, np.full(POINTS, 0.5)], axis=1)
     turns = Rotation.from_rotvec(np.stack([0 * done, 0 * done, done + angle_rad], axis=1))
     return PosePath(position, turns.as_quat(scalar_first=True))
 
 
-PATHS = [path(-0.1, -0.2, 0.3), path(0.0, 0.0), path(0.1, 0.2, -0.3), path(3.0, 1.0), path(3.2, 1.1)]
-GROUPS = ["left", "left", "left", "right", "right"]
-
-
-def training_set(carry: bool = False) -> PoseTrainingSet:
-    return PoseTrainingSet.of(PATHS, GROUPS, carry)
+PATHS = [path(-0.1, -0.2), path(), path(0.1, 0.2), path(3.0, 1.0)]
 
 
 def test_place_and_size_are_the_mean_and_the_root_mean_square_distance():
     paths = [PosePath(np.array([[1.0, 0, 0], [3, 0, 0]]), PATHS[0].orientation[:2]) for _ in range(3)]
-    geometry = PoseGeometry.of(paths)
-    assert (geometry.centre_m, geometry.scale_m, geometry.orientation_dim) == ((2.0, 0.0, 0.0), 1.0, 4)
-    assert geometry.position_dim == 3
-    scaled = np.concatenate([PoseGeometry.of(PATHS).scaled(one) for one in PATHS])
+    space = PoseSpace.of(paths)
+    assert isinstance(space, StateSpace)
+    assert (space.centre_m, space.scale_m, space.orientation_dim) == ((2.0, 0.0, 0.0), 1.0, 4)
+    assert space.position_dim == 3
+    scaled = np.concatenate([PoseSpace.of(PATHS).scaled(one) for one in PATHS])
     np.testing.assert_allclose(scaled[:, :3].mean(axis=0), 0, atol=1e-12)
     assert np.square(scaled[:, :3]).sum(axis=1).mean() == pytest.approx(1)
     np.testing.assert_array_equal(scaled[:POINTS, 3:], PATHS[0].orientation)
 
 
-def test_directions_in_the_plane_are_taken_too():
-    flat = PosePath(SHARES[:, None] * np.array([1.0, 2.0]), np.tile([0.0, 0, 1], (POINTS, 1)))
-    data = PoseTrainingSet.of([flat], [""], carry=True)
-    assert (data.geometry.position_dim, data.geometry.orientation_dim) == (2, 3)
-    poses, progress = data.tensors(3, False, 0)
-    assert poses.shape == (POINTS, 5) and len(progress) == POINTS  # nothing to mix with
+def test_what_a_network_means_are_the_poses_that_it_was_shown():
+    space = PoseSpace.of(PATHS)
+    again = space.path(space.scaled(PATHS[2]))
+    np.testing.assert_allclose(again.vectors, PATHS[2].vectors, atol=1e-14)
+    assert PoseSpace(**space.document()) == space
 
 
-def test_demonstrations_are_registered_within_their_groups():
-    data = training_set()
-    assert data.groups == (0, 0, 0, 1, 1)
-    for progress in data.progress:
-        assert (progress[0], progress[-1]) == (0, 1) and (np.diff(progress) > 0).all()
-    slow, even, fast = data.progress[:3]
-    assert slow[POINTS // 4] < even[POINTS // 4] - 0.02 and fast[POINTS // 4] > even[POINTS // 4] + 0.02
-    np.testing.assert_allclose(data.progress[3], SHARES, atol=0.02)
-    alone = PoseTrainingSet.of(PATHS[3:], GROUPS[3:], carry=False)
-    np.testing.assert_allclose(data.progress[3], alone.progress[0], atol=1e-6)
+def test_poses_are_apart_by_position_and_orientation_whatever_the_sign():
+    space, one = PoseSpace.of(PATHS), PATHS[1][7:8]
+    found = space.separation(PATHS[3], one)
+    in_m = np.linalg.norm(PATHS[3].position_m - one.position_m, axis=1) / space.scale_m
+    chords = np.linalg.norm(PATHS[3].orientation - one.orientation, axis=1)
+    np.testing.assert_allclose(found, np.hypot(in_m, chords))
+    other = PosePath(one.position_m, -one.orientation)
+    np.testing.assert_array_equal(space.separation(PATHS[3], other), found)
+    assert space.separation(PATHS[1], other).argmin() == 7 and space.separation(PATHS[1], other).min() < 1e-7
 
 
-def test_carried_demonstrations_share_the_ends_of_their_group_and_keep_their_originals():
-    data = training_set(carry=True)
-    for group in (0, 1):
-        members = [one for number, one in enumerate(data.paths) if data.groups[number] == group]
-        for end in (0, -1):
-            positions = np.stack([one.position_m[end] for one in members])
-            wanted = np.mean(
-                [one.position_m[end] for one, g in zip(PATHS, data.groups, strict=True) if g == group], axis=0
-            )
-            np.testing.assert_allclose(positions, np.tile(wanted, (len(members), 1)), atol=1e-12)
-            orientations = np.stack([one.orientation[end] for one in members])
-            np.testing.assert_allclose(orientations, orientations[[0] * len(members)], atol=1e-12)
-    for original, one in zip(data.originals, PATHS, strict=True):
-        np.testing.assert_array_equal(original.position_m, one.position_m)
-    as_they_are = training_set(carry=False)
-    np.testing.assert_array_equal(as_they_are.paths[2].position_m, PATHS[2].position_m)
+def test_any_pose_is_allowed_and_demonstrated_ones_are_supported():
+    space = PoseSpace.of(PATHS)
+    assert space.allows(PATHS[0]).shape == (POINTS,) and space.allows(PATHS[0]).all()
+    for apart in space.support(PATHS).distances(PATHS[2]):
+        assert apart.max() < 1e-7
 
 
-def test_tensors_hold_every_pose_with_its_progress():
-    data = training_set()
-    poses, progress = data.tensors(0, False, 0)
-    assert poses.dtype is progress.dtype is torch.float32
-    np.testing.assert_allclose(poses.numpy(), np.concatenate([data.geometry.scaled(one) for one in PATHS]), atol=1e-6)
-    np.testing.assert_allclose(progress.numpy(), np.concatenate(data.progress), atol=1e-6)
-
-
-def test_doubled_poses_come_again_with_the_other_sign():
-    data = training_set()
-    poses, progress = data.tensors(2, False, 0)
-    doubled, twice = data.tensors(2, True, 0)
-    half = len(poses)
-    assert len(doubled) == len(twice) == 2 * half
-    assert torch.equal(doubled[:half], poses) and torch.equal(twice[half:], progress)
-    assert torch.equal(doubled[half:, :3], poses[:, :3]) and torch.equal(doubled[half:, 3:], -poses[:, 3:])
-
-
-def test_mixtures_lie_between_demonstrations_of_one_group_at_equal_progress():
-    data, copies = training_set(), 4
-    poses, progress = data.tensors(copies, False, 0)
-    originals = len(PATHS) * POINTS
-    assert len(poses) == (1 + copies) * originals
-    mixed = poses[originals:].reshape(len(PATHS), copies, POINTS, 7).numpy()
-    shares = progress[originals:].reshape(len(PATHS), copies, POINTS).numpy()
-    np.testing.assert_allclose(np.linalg.norm(mixed[..., 3:], axis=-1), 1, atol=1e-6)
-    scaled = [data.geometry.scaled(one) for one in data.paths]
-    for number, group in enumerate(data.groups):
-        np.testing.assert_allclose(shares[number], np.tile(data.progress[number], (copies, 1)), atol=1e-6)
-        matched = np.stack(
-            [
-                np.stack(
-                    [np.interp(data.progress[number], data.progress[other], axis) for axis in scaled[other].T[:3]],
-                    axis=1,
-                )
-                for other in range(len(PATHS))
-                if data.groups[other] == group
-            ]
-        )
-        low, high = matched.min(axis=0) - 1e-5, matched.max(axis=0) + 1e-5
-        assert ((mixed[number, ..., :3] >= low) & (mixed[number, ..., :3] <= high)).all()
-    assert np.ptp(mixed[0, :, 0, 1]) > 1e-3  # shares differ
-
-
-def test_mixtures_follow_their_seed():
-    data = training_set()
-    one, again, other = (data.tensors(3, False, seed)[0] for seed in (0, 0, 1))
-    assert torch.equal(one, again) and not torch.equal(one, other)
+@pytest.mark.parametrize("position_dim", [2, 3])
+def test_both_signs_are_the_poses_and_then_the_poses_with_the_other_sign(position_dim):
+    poses, progress = torch.randn(11, position_dim + 4), torch.rand(11)
+    doubled, twice = both_signs(poses, progress, position_dim)
+    assert len(doubled) == len(twice) == 22
+    assert torch.equal(doubled[:11], poses) and torch.equal(twice[:11], progress) and torch.equal(twice[11:], progress)
+    assert torch.equal(doubled[11:, :position_dim], poses[:, :position_dim])
+    assert torch.equal(doubled[11:, position_dim:], -poses[:, position_dim:])

@@ -1,5 +1,6 @@
 """Names of single columns, shared by the stored layout and by the files that users bring (docs/data.md)."""
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,15 +8,18 @@ from dataclasses import dataclass
 from geomotion.demos.demonstrations import UNIT_AXES, Array
 
 METRES_PER = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+RADIANS_PER = {"rad": 1.0, "deg": math.pi / 180}
 TIME_COLUMNS = ("time_s", "timestamp")
 DEMO_COLUMNS = ("demo", "episode", "episode_index")
 BOOKKEEPING_COLUMNS = ("frame_index", "index", "task_index")  # of LeRobot datasets
 ALL_COLUMNS = (
     *TIME_COLUMNS, *DEMO_COLUMNS, "x", "y", "z", "x_mm", "y_mm", "z_mm", "position_m_x", "position_m_y", "position_m_z",
     "orientation_w", "orientation_x", "orientation_y", "orientation_z", "direction_x", "direction_y", "direction_z",
-    "joint_1_rad", "joint_1_rad_per_s",
+    "joint_1_rad", "joint_1_deg", "joint_1_rad_per_s", "panda_joint1", "q1",
     "velocity_m_per_s_x", "velocity_m_per_s_y", "velocity_m_per_s_z",
 )  # fmt: skip
+
+_JOINT = r"(?:\w+_)?joint(?:_?[a-z]?\d+)?"  # as URDFs call them: panda_joint1, shoulder_pan_joint, joint_a1
 
 _PATTERNS = (
     ("position_m", re.compile(r"position_(?P<unit>m|cm|mm)_(?P<axis>[xyz]|\d+)")),
@@ -24,7 +28,10 @@ _PATTERNS = (
     ("orientation_wxyz", re.compile(r"orientation_(?P<axis>[wxyz])")),
     ("direction_xyz", re.compile(r"direction_(?P<axis>[xyz])")),
     ("joint_velocity_rad_per_s", re.compile(r"joint_(?P<axis>.+)_rad_per_s")),
-    ("joints_rad", re.compile(r"joint_(?P<axis>.+)_rad")),
+    ("joint_velocity_rad_per_s", re.compile(rf"(?P<axis>{_JOINT})_rad_per_s")),
+    ("joints_rad", re.compile(r"joint_(?P<axis>.+)_(?:rad|(?P<unit>deg))")),
+    ("joints_rad", re.compile(rf"(?P<axis>{_JOINT})(?:\.pos|[._]position)?(?:_rad|_(?P<unit>deg))?")),
+    ("joints_rad", re.compile(r"q_?(?P<axis>\d+)(?:_rad|_(?P<unit>deg))?")),
 )
 
 
@@ -35,7 +42,7 @@ class Column:
     Attributes:
         channel: Channel of a trajectory.
         axis: Its axis there: x, y, z, w, a number, or a joint's name.
-        unit: Length unit in the name; None where the name gives none or the channel is not a length.
+        unit: Unit of a length in the name, or ``deg``; None where the name gives none or says ``rad``.
     """
 
     channel: str
@@ -62,6 +69,12 @@ def column_names(channel: str, width: int) -> list[str]:
         return [f"joint_{number}_rad_per_s" for number in range(1, width + 1)]
     axes = "xyz"[:width] if width <= 3 else [str(number) for number in range(width)]
     return [f"{channel}_{axis}" for axis in axes]
+
+
+def joint_names(axes: Iterable[str]) -> tuple[str, ...]:
+    """Names of joints in the order of the channel; empty where they are but numbers."""
+    axes = sorted_axes(axes)
+    return () if all(axis.isdigit() for axis in axes) else tuple(axes)
 
 
 def space_of(channels: dict[str, Array]) -> str:

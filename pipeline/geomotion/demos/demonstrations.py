@@ -82,6 +82,7 @@ class Demonstrations:
         source: Where the recordings come from, with the citation.
         licence: Licence of the recordings.
         steps: Preprocessing steps, one sentence each, in order.
+        joint_names: Names of the axes of ``joints_rad``; empty where they are not known.
     """
 
     name: str
@@ -91,9 +92,14 @@ class Demonstrations:
     source: str = ""
     licence: str = ""
     steps: tuple[str, ...] = field(default=())
+    joint_names: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
         validate(self.name, self.trajectories)
+        joints = self.trajectories[0].channels.get("joints_rad")
+        if self.joint_names and (joints is None or joints.shape[1] != len(self.joint_names)):
+            found = "no joints" if joints is None else f"{joints.shape[1]} joints"
+            raise DatasetError(self.name, f"holds {found}; expected one for each of {', '.join(self.joint_names)}")
 
     def __len__(self) -> int:
         return len(self.trajectories)
@@ -115,6 +121,7 @@ class Demonstrations:
             "source": self.source,
             "licence": self.licence,
             "steps": list(self.steps),
+            "joint_names": list(self.joint_names),
             "channels": {name: values.shape[1] for name, values in self.trajectories[0].channels.items()},
         }
 

@@ -1,6 +1,7 @@
 """Preprocessing as explicit steps in a fixed order; every step that changes something is recorded with the data.
 
-Order: trim, clocks from zero, quaternions and directions, resample, smooth, align end points, scale, velocities.
+Order: trim, clocks from zero, quaternions, directions and whole turns of joints, resample, smooth, align end points,
+scale, velocities.
 """
 
 import logging
@@ -11,6 +12,7 @@ import numpy as np
 
 from geomotion.config import PreprocessConfig, VelocitySource
 from geomotion.demos.demonstrations import UNIT_AXES, VELOCITY_OF, Array, Demonstrations, Trajectory
+from geomotion.demos.joints import without_whole_turns
 from geomotion.errors import InvalidSetting
 
 QUATERNION = "orientation_wxyz"
@@ -38,6 +40,7 @@ def preprocess(demonstrations: Demonstrations, config: PreprocessConfig) -> Demo
     demonstrations = _start_clocks_at_zero(demonstrations)
     demonstrations = _tidy_quaternions(demonstrations)
     demonstrations = _tidy_directions(demonstrations)
+    demonstrations = without_whole_turns(demonstrations)
     demonstrations = _resample(demonstrations, config)
     demonstrations = _smooth(demonstrations, config)
     demonstrations = _align_ends(demonstrations, config)

@@ -16,7 +16,8 @@ def split(config: DatasetConfig, demonstrations: Demonstrations) -> tuple[tuple[
         InvalidSetting: If a number does not exist, is given twice, is on both sides, or nothing is left to train on.
     """
     count = len(demonstrations)
-    held_out = HELD_OUT if count >= 2 * HELD_OUT else 0
+    held_out = HELD_OUT if config.held_out is None else config.held_out
+    held_out = held_out if count >= 2 * held_out else 0
     train = range(count - held_out) if config.train_demos is None else config.train_demos
     _check("dataset.train_demos", train, count)
     if not train:

@@ -69,6 +69,7 @@ def load(folder: Path) -> Demonstrations:
             source=own["source"],
             licence=own["licence"],
             steps=tuple(own["steps"]),
+            joint_names=tuple(own.get("joint_names", ())),  # sets written before names were kept have none
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise CorruptArtefact(folder / INFO, f"lacks what a dataset of this program has ({error})") from error

@@ -1,20 +1,22 @@
 """Geodesics between the ends of demonstrations, judged against those demonstrations and a simple baseline."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from geomotion.figures.plan import label_positions, outline_sphere, path_data
+from geomotion.figures.joints import JOINT_MM, LIMIT, JointAxes, label_joint, rows_of
+from geomotion.figures.plan import path_data
+from geomotion.figures.plan_panels import label_positions, outline_sphere
+from geomotion.figures.plan_picture import planes_of
 from geomotion.figures.style import COLOUR, new_figure, paper_style, save_figure
-from geomotion.scores.paths import DIRECTION, PosePath
+from geomotion.scores.paths import DIRECTION, MotionPath
 
-Part = Literal["position", "orientation"]
 LEGEND_MM, PANEL_MM, RATIO_MM = 12.0, 68.0, 48.0
 TRAINING: dict[str, Any] = {"color": COLOUR["field"], "linewidth": 0.6, "zorder": 1}
 DEMONSTRATION: dict[str, Any] = {"color": COLOUR["demonstration"], "linewidth": 1.2, "zorder": 2}
@@ -42,30 +44,26 @@ class JudgedGeodesic:
         geodesic: Planned path; None where there is none.
         averaged: Mean of the training demonstrations with blended ends.
         line: Decoded straight latent line; None where there is none.
-        position_ratio: DTWD of the geodesic over that between demonstrations, in position; not a number without one.
-        orientation_ratio: The same in orientation.
-        averaged_position_ratio: The same of the averaged demonstration, in position.
-        averaged_orientation_ratio: The same of the averaged demonstration, in orientation.
+        ratio: DTWD of the geodesic over that between demonstrations, by part; not a number without one.
+        averaged_ratio: The same of the averaged demonstration.
     """
 
     number: int
-    demonstration: PosePath
-    geodesic: PosePath | None
-    averaged: PosePath
-    line: PosePath | None
-    position_ratio: float
-    orientation_ratio: float
-    averaged_position_ratio: float
-    averaged_orientation_ratio: float
+    demonstration: MotionPath
+    geodesic: MotionPath | None
+    averaged: MotionPath
+    line: MotionPath | None
+    ratio: Mapping[str, float]
+    averaged_ratio: Mapping[str, float]
 
-    def ratios(self, part: Part) -> tuple[float, float]:
+    def ratios(self, part: str) -> tuple[float, float]:
         """Of the geodesic, and of the averaged demonstration."""
-        return getattr(self, f"{part}_ratio"), getattr(self, f"averaged_{part}_ratio")
+        return self.ratio[part], self.averaged_ratio[part]
 
 
 @paper_style()
 def draw_geodesics(
-    ax: Axes, judged: Sequence[JudgedGeodesic], training: Sequence[PosePath], plane: tuple[int, int]
+    ax: Axes, judged: Sequence[JudgedGeodesic], training: Sequence[MotionPath], plane: tuple[int, int]
 ) -> Axes:
     """Draw positions projected to a plane."""
     for path, look in _layers(judged, training):
@@ -75,7 +73,7 @@ def draw_geodesics(
 
 
 @paper_style()
-def draw_geodesic_directions(ax: Axes, judged: Sequence[JudgedGeodesic], training: Sequence[PosePath]) -> Axes:
+def draw_geodesic_directions(ax: Axes, judged: Sequence[JudgedGeodesic], training: Sequence[MotionPath]) -> Axes:
     """Draw directions on the unit sphere, seen from its pole."""
     for path, look in _layers(judged, training):
         ax.plot(*path.orientation[:, :2].T, **look)
@@ -84,7 +82,20 @@ def draw_geodesic_directions(ax: Axes, judged: Sequence[JudgedGeodesic], trainin
 
 
 @paper_style()
-def draw_ratios(ax: Axes, judged: Sequence[JudgedGeodesic], part: Part) -> Axes:
+def draw_geodesic_joint(
+    ax: Axes, judged: Sequence[JudgedGeodesic], training: Sequence[MotionPath], joints: JointAxes, joint: int
+) -> Axes:
+    """Draw one joint over the share of the path."""
+    shown = []
+    for path, look in _layers(judged, training):
+        shown.append(path.vectors[:, joint])
+        ax.plot(np.linspace(0, 1, len(path)), shown[-1], **look)
+    label_joint(ax, joints, joint, shown)
+    return ax
+
+
+@paper_style()
+def draw_ratios(ax: Axes, judged: Sequence[JudgedGeodesic], part: str) -> Axes:
     """Draw the DTWD ratio of each geodesic beside that of the averaged demonstration, which it has to beat."""
     places = np.arange(len(judged))
     ratios = np.array([one.ratios(part) for one in judged], dtype=float)
@@ -97,51 +108,62 @@ def draw_ratios(ax: Axes, judged: Sequence[JudgedGeodesic], part: Part) -> Axes:
     known = ratios[np.isfinite(ratios)]
     ax.set(xlim=(-0.6, len(judged) - 0.4), ylim=(0, 1.12 * max(1.0, known.max(initial=0.0))))
     ax.set_xticks(places, [str(one.number) for one in judged])
-    ax.set(xlabel="demonstration [1]", ylabel="DTWD ratio [1]", title=f"{part}: {_means(ratios)}")
+    ax.set(xlabel="demonstration [1]", ylabel="DTWD ratio [1]", title=f"{part}\n{_means(ratios)}")
     return ax
 
 
-def widest_planes(paths: Sequence[PosePath], count: int = 2) -> list[tuple[int, int]]:
+def widest_planes(paths: Sequence[MotionPath], count: int = 2) -> list[tuple[int, int]]:
     """The planes in which motions are seen best: along the axis of their largest extent and each of the others."""
     extent = np.ptp(np.concatenate([path.position_m for path in paths]), axis=0)
-    longest, *others = np.argsort(-extent, kind="stable").tolist()
-    return [(min(longest, other), max(longest, other)) for other in others[:count]]
+    longest = int(extent.argmax())
+    planes = [plane for plane in planes_of(paths) if longest in plane]
+    return sorted(planes, key=lambda plane: -extent[list(plane)].min())[:count]
 
 
 @paper_style()
-def figure_geodesics(judged: list[JudgedGeodesic], training: list[PosePath]) -> Figure:
-    """Paths in two views above, ratios in position and in orientation below."""
+def figure_geodesics(
+    judged: list[JudgedGeodesic], training: list[MotionPath], joints: JointAxes | None = None
+) -> Figure:
+    """Paths of the end effector above, joints if there are any, and ratios of each part below."""
     paths = [*training, *(one.demonstration for one in judged)]
-    planes, has_directions = widest_planes(paths), paths[0].orientation.shape[1] == DIRECTION
-    views = len(planes) + has_directions
-    figure = new_figure(175, LEGEND_MM + PANEL_MM + RATIO_MM)
-    above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=(PANEL_MM, RATIO_MM))[:, 0]
+    planes, has_directions = widest_planes(paths), joints is None and paths[0].orientation.shape[1] == DIRECTION
+    views, parts = len(planes) + has_directions, list(judged[0].ratio)
+    joint_rows = 0 if joints is None else rows_of(len(joints.names))[0]
+    heights = [PANEL_MM, *[joint_rows * JOINT_MM] * bool(joint_rows), RATIO_MM]
+    figure = new_figure(175, LEGEND_MM + sum(heights))
+    above, *between, below = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
     axes = above.subplots(1, views, squeeze=False)[0]
     for ax, plane in zip(axes, planes, strict=False):
         draw_geodesics(ax, judged, training, plane)
     if has_directions:
         draw_geodesic_directions(axes[-1], judged, training)
-    left, right = below.subplots(1, 2)
-    draw_ratios(left, judged, "position")
-    draw_ratios(right, judged, "orientation")
-    figure.legend(handles=_handles(judged, training), loc="outside upper center", ncols=4)
+    if joints is not None:
+        for joint in range(len(joints.names)):
+            ax = between[0].add_subplot(*rows_of(len(joints.names)), 1 + joint)
+            draw_geodesic_joint(ax, judged, training, joints, joint)
+    for ax, part in zip(below.subplots(1, len(parts), squeeze=False)[0], parts, strict=True):
+        draw_ratios(ax, judged, part)
+    figure.legend(handles=_handles(judged, training, joints), loc="outside upper center", ncols=4)
     return figure
 
 
-def save_geodesics_figure(judged: list[JudgedGeodesic], training: list[PosePath], folder: Path) -> list[str]:
+def save_geodesics_figure(
+    judged: list[JudgedGeodesic], training: list[MotionPath], folder: Path, joints: JointAxes | None = None
+) -> list[str]:
     """Draw judged geodesics into `folder`; returns the names of the files.
 
     Args:
         judged: One or more.
         training: Demonstrations that were trained on.
         folder: Where to.
+        joints: Of the arm, if the paths are of its configurations.
     """
-    return save_figure(figure_geodesics(judged, training), folder, "geodesics", _data(judged, training))
+    return save_figure(figure_geodesics(judged, training, joints), folder, "geodesics", _data(judged, training))
 
 
 def _layers(
-    judged: Sequence[JudgedGeodesic], training: Sequence[PosePath]
-) -> Iterator[tuple[PosePath, dict[str, Any]]]:
+    judged: Sequence[JudgedGeodesic], training: Sequence[MotionPath]
+) -> Iterator[tuple[MotionPath, dict[str, Any]]]:
     """Every path that there is with its look, the important ones last."""
     yield from ((path, TRAINING) for path in training)
     looks = {"demonstration": DEMONSTRATION, "line": LINE, "averaged": AVERAGED, "geodesic": GEODESIC}
@@ -150,17 +172,15 @@ def _layers(
         yield from ((path, look) for path in paths if path is not None)
 
 
-def _data(judged: Sequence[JudgedGeodesic], training: Sequence[PosePath]) -> dict[str, np.ndarray]:
-    arrays = path_data("training", training)
+def _data(judged: Sequence[JudgedGeodesic], training: Sequence[MotionPath]) -> dict[str, np.ndarray]:
+    arrays = path_data("training", dict(enumerate(training)))
     for one in judged:
         for name in ("demonstration", "geodesic", "averaged", "line"):
             path = getattr(one, name)
             if path is not None:
-                arrays[f"{name}_{one.number}_position_m"] = path.position_m
-                arrays[f"{name}_{one.number}_orientation"] = path.orientation
+                arrays |= path_data(name, {one.number: path})
     arrays["numbers"] = np.array([one.number for one in judged], dtype=int)
-    parts: tuple[Part, ...] = ("position", "orientation")
-    return arrays | {f"{part}_ratios": np.array([one.ratios(part) for one in judged], dtype=float) for part in parts}
+    return arrays | {f"{part}_ratios": np.array([one.ratios(part) for one in judged]) for part in judged[0].ratio}
 
 
 def _means(ratios: np.ndarray) -> str:
@@ -172,7 +192,9 @@ def _means(ratios: np.ndarray) -> str:
     return f"mean {own:.2f}; averaged demo {averaged:.2f}"
 
 
-def _handles(judged: Sequence[JudgedGeodesic], training: Sequence[PosePath]) -> list[Line2D]:
+def _handles(
+    judged: Sequence[JudgedGeodesic], training: Sequence[MotionPath], joints: JointAxes | None
+) -> list[Line2D]:
     looks: dict[str, tuple[bool, dict[str, Any]]] = {
         "geodesic": (True, GEODESIC | {"marker": "o", "markersize": 5}),
         "averaged demonstration": (True, AVERAGED_DOT | AVERAGED),
@@ -183,5 +205,6 @@ def _handles(judged: Sequence[JudgedGeodesic], training: Sequence[PosePath]) -> 
             True,
             {"color": COLOUR["euclidean"], "linestyle": "--", "linewidth": 0.8},
         ),
+        "joint limit": (joints is not None, LIMIT),
     }
     return [Line2D([], [], label=name, **look) for name, (is_drawn, look) in looks.items() if is_drawn]

@@ -1,4 +1,4 @@
-"""The latent plane of a pose manifold: how sure the decoder is, and how much it stretches (Fig. 3.1)."""
+"""The latent plane of a manifold: how sure the decoder is, and how much it stretches (Fig. 3.1, 4.1)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,28 +35,33 @@ SIDE_MM, BAR_MM, LEGEND_MM = 72.0, 22.0, 12.0
 
 @dataclass(frozen=True)
 class LatentMaps:
-    """A latent plane on a grid, with the demonstrations in it.
+    """A latent plane or space on a grid, with the demonstrations in it.
 
     Attributes:
         axes: Grid coordinates along each latent axis [-].
         log_std: Base-10 logarithm of the decoder's standard deviation over the size of the data.
         log_magnification: Natural logarithm of √det M.
         within: Nodes inside the support cap.
-        codes: Encoded training demonstrations, each of shape (n, 2).
+        codes: Encoded training demonstrations, each of shape (n, d).
         other_codes: Codes of their antipodal copies; may be empty.
         groups: Group of each demonstration.
     """
 
     axes: tuple[Float[np.ndarray, " _"], ...]
-    log_std: Float[np.ndarray, "nx ny"]
-    log_magnification: Float[np.ndarray, "nx ny"]
-    within: Bool[np.ndarray, "nx ny"]
-    codes: list[Float[np.ndarray, "_ 2"]]
-    other_codes: Float[np.ndarray, "_ 2"]
+    log_std: Float[np.ndarray, "*shape"]
+    log_magnification: Float[np.ndarray, "*shape"]
+    within: Bool[np.ndarray, "*shape"]
+    codes: list[Float[np.ndarray, "_ d"]]
+    other_codes: Float[np.ndarray, "_ d"]
     groups: list[int]
 
     @property
-    def corners(self) -> Float[np.ndarray, "2 2"]:
+    def dim(self) -> int:
+        """d."""
+        return len(self.axes)
+
+    @property
+    def corners(self) -> Float[np.ndarray, "2 d"]:
         """Lowest and highest latent coordinates."""
         return np.array([[axis[end] for axis in self.axes] for end in (0, -1)])
 
@@ -67,6 +72,14 @@ def group_colour(group: int, groups: Sequence[int]) -> str:
     if len(known) < 2:
         return COLOUR["demonstration"]
     return GROUP_COLOURS[known.index(group) % len(GROUP_COLOURS)]
+
+
+def group_names(groups: Sequence[int]) -> dict[int, str]:
+    """What legends call the encoded demonstrations of each group."""
+    known = sorted(set(groups))
+    if len(known) < 2:
+        return dict.fromkeys(known, "encoded demonstrations")
+    return {group: f"demonstrations, group {group}" for group in known}
 
 
 @paper_style()
@@ -82,22 +95,42 @@ def draw_latent(ax: Axes, maps: LatentMaps, which: Quantity = "log_std") -> Axes
     low, high = np.percentile(values[np.isfinite(values)], PERCENTILES)
     image = ax.pcolormesh(*maps.axes, values.T, cmap=COLOURMAP, vmin=low, vmax=high, shading="nearest", rasterized=True)
     ax.figure.colorbar(image, cax=ax.inset_axes(BAR_PLACE), label=LABELS[which], extend="both")
-    _outline(ax, maps)
-    _scatter(ax, maps)
-    ax.set(xlabel="$z_1$ [1]", ylabel="$z_2$ [1]", aspect="equal", title=TITLES[which])
+    draw_support_cap(ax, maps)
+    draw_codes(ax, maps)
+    label_latent(ax)
+    ax.set(title=TITLES[which])
+    return ax
+
+
+def label_latent(ax: Axes) -> None:
+    """Label the axes of a latent plane, with equal scales."""
+    ax.set(xlabel="$z_1$ [1]", ylabel="$z_2$ [1]", aspect="equal")
     for direction in (ax.xaxis, ax.yaxis):
         direction.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
-    return ax
+
+
+def draw_support_cap(ax: Axes, maps: LatentMaps) -> None:
+    """A thin line around the nodes inside the support cap."""
+    if _has_outline(maps):
+        ax.contour(
+            *maps.axes, maps.within.T.astype(float), levels=[0.5], colors=COLOUR["euclidean"], linewidths=0.7, zorder=1
+        )
+
+
+def draw_codes(ax: Axes, maps: LatentMaps) -> None:
+    """Encoded demonstrations as small semi-transparent points."""
+    dots: dict[str, Any] = {"s": 3.0, "linewidths": 0.0, "rasterized": True}
+    ax.scatter(*maps.other_codes.T, color=COLOUR["euclidean"], alpha=0.25, zorder=1.5, **dots)
+    for codes, group in zip(maps.codes, maps.groups, strict=True):
+        ax.scatter(*codes.T, color=group_colour(group, maps.groups), alpha=0.5, zorder=2, **dots)
 
 
 def legend_handles(maps: LatentMaps) -> list[Line2D]:
     """What the points and the thin line mean."""
     dots: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 3, "mew": 0}
-    known = sorted(set(maps.groups))
-    names = {group: f"demonstrations, group {group}" for group in known} if len(known) > 1 else {}
     found = [
-        Line2D([], [], color=group_colour(group, maps.groups), label=names.get(group, "encoded demonstrations"), **dots)
-        for group in known
+        Line2D([], [], color=group_colour(group, maps.groups), label=name, **dots)
+        for group, name in group_names(maps.groups).items()
     ]
     if len(maps.other_codes):
         found.append(Line2D([], [], color=COLOUR["euclidean"], label="antipodal copies", **dots))
@@ -134,18 +167,3 @@ def maps_data(maps: LatentMaps) -> dict[str, np.ndarray]:
 
 def _has_outline(maps: LatentMaps) -> bool:
     return bool(maps.within.any() and not maps.within.all())
-
-
-def _outline(ax: Axes, maps: LatentMaps) -> None:
-    if _has_outline(maps):
-        ax.contour(
-            *maps.axes, maps.within.T.astype(float), levels=[0.5], colors=COLOUR["euclidean"], linewidths=0.7, zorder=1
-        )
-
-
-def _scatter(ax: Axes, maps: LatentMaps) -> None:
-    """Encoded demonstrations as small semi-transparent points."""
-    dots: dict[str, Any] = {"s": 3.0, "linewidths": 0.0, "rasterized": True}
-    ax.scatter(*maps.other_codes.T, color=COLOUR["euclidean"], alpha=0.25, zorder=1.5, **dots)
-    for codes, group in zip(maps.codes, maps.groups, strict=True):
-        ax.scatter(*codes.T, color=group_colour(group, maps.groups), alpha=0.5, zorder=2, **dots)

@@ -69,7 +69,10 @@ def draw_errors(
 
 
 def draw_limit_margin(ax: Axes, picture: ReplayPicture) -> Axes:
-    """Draw how far the joint nearest to a limit is from it; below zero it is beyond."""
+    """Draw how far the joint nearest to a limit is from it; below zero it is beyond; nothing where there are none."""
+    if not np.isfinite(picture.limit_margin_rad).all():
+        ax.set(ylabel="joint-limit margin [deg]", title="no limits")
+        return ax
     margin_deg = np.degrees(picture.limit_margin_rad)
     ax.plot(picture.time_s, margin_deg, color=COLOUR["riemannian"], linewidth=1.2)
     ax.axhline(0, **LIMIT)

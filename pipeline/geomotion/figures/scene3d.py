@@ -8,24 +8,20 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from geomotion.figures.plan import ObstacleShape, PlanPicture, in_a_row
+from geomotion.figures.latent import group_colour
+from geomotion.figures.plan_picture import ObstacleShape, PlanPicture
 from geomotion.figures.style import COLOUR
-from geomotion.files import write_text
-from geomotion.scores.paths import QUATERNION, PosePath
+from geomotion.figures.traces3d import Points, arrange, legs, line, named_once, polylines, save_page, surface
+from geomotion.scores.paths import QUATERNION, MotionPath
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure, Mesh3d, Scatter3d
 
-Points = Float[np.ndarray, "_ 3"]
 TRIADS = 12  # along each path
 TRIAD_SHARE = 0.06  # of the size of the scene
 AXIS_COLOURS = {"tool x": "#CC3311", "tool y": "#009E73", "tool z": "#56B4E9"}
-HELD_OUT_DASH, LINE_DASH = "dot", "dash"
-GREY, SPHERE = "#595959", "#E8E8E8"
+HELD_OUT_DASH, SPHERE = "dot", "#E8E8E8"
 MERIDIAN_DEG = 30
-CONFIG = {"displaylogo": False}
-HEIGHT = "92vh"
-CAMERA = {"eye": {"x": 1.5, "y": 1.5, "z": 0.9}}
 
 
 def save_scene(picture: PlanPicture, path: Path) -> None:
@@ -38,9 +34,7 @@ def save_scene(picture: PlanPicture, path: Path) -> None:
     Raises:
         DiskFull: If space ran out.
     """
-    write_text(
-        path, scene(picture).to_html(include_plotlyjs=True, default_height=HEIGHT, div_id="scene", config=CONFIG)
-    )
+    save_page(scene(picture), path)
 
 
 def scene(picture: PlanPicture) -> "Figure":
@@ -55,15 +49,11 @@ def scene(picture: PlanPicture) -> "Figure":
         figure.add_traces(_direction_traces(picture), rows=1, cols=2)
     names = {1: ("x [m]", "y [m]", "z [m]"), 2: ("direction x [1]", "direction y [1]", "direction z [1]")}
     for column in range(1, 1 + len(titles)):
-        axes = {f"{axis}axis": {"title": name} for axis, name in zip("xyz", names[column], strict=True)}
-        figure.update_scenes(aspectmode="data", camera=CAMERA, row=1, col=column, **axes)
-    figure.update_layout(
-        template="plotly_white", margin={"l": 0, "r": 0, "t": 40, "b": 0}, legend={"itemsizing": "constant"}
-    )
+        arrange(figure, names[column], column)
     return figure
 
 
-def triads(path: PosePath, length_m: float, count: int = TRIADS) -> dict[str, Points]:
+def triads(path: MotionPath, length_m: float, count: int = TRIADS) -> dict[str, Points]:
     """Axes of the tool at some poses along a path, each as one polyline with gaps [m].
 
     Args:
@@ -91,8 +81,22 @@ def _position_traces(picture: PlanPicture) -> list[Any]:
         size_m = float(np.linalg.norm(np.ptp(np.concatenate(demonstrations), axis=0)))
         for path in picture.paths:
             for name, points in triads(path, TRIAD_SHARE * size_m).items():
-                traces.append(_line(points, name, AXIS_COLOURS[name], width=3))
-    return _named_once(traces)
+                traces.append(line(points, name, AXIS_COLOURS[name], width=3))
+    return named_once(traces + _arm_traces(picture))
+
+
+def _arm_traces(picture: PlanPicture) -> list["Scatter3d"]:
+    """Links of the arm as polylines, along the path and, at first hidden, along one demonstration of each group."""
+    if picture.arm is None:
+        return []
+    along = [_in_space(pose) for poses in picture.arm.along for pose in poses]
+    traces = [polylines(along, "arm along the path", COLOUR["riemannian"], 4, opacity=0.5)] if along else []
+    for group, poses in picture.arm.demonstrated.items():
+        colour = group_colour(group, picture.groups)
+        shown = polylines(map(_in_space, poses), f"arm, demonstrated in group {group}", colour, 3, opacity=0.5)
+        shown.visible = "legendonly"
+        traces.append(shown)
+    return traces
 
 
 def _direction_traces(picture: PlanPicture) -> list[Any]:
@@ -108,18 +112,12 @@ def _curves(
     demonstrations: Sequence[Points], geodesics: Sequence[Points], lines: Sequence[Points], held_out: Sequence[int]
 ) -> list["Scatter3d"]:
     traces = [
-        _line(points, "held out", "black", 3, HELD_OUT_DASH)
+        line(points, "held out", "black", 3, HELD_OUT_DASH)
         if number in held_out
-        else _line(points, "demonstration", "black", 1.5, opacity=0.6)
+        else line(points, "demonstration", "black", 1.5, opacity=0.6)
         for number, points in enumerate(demonstrations)
     ]
-    traces += [_line(points, "straight latent line", GREY, 4, LINE_DASH) for points in lines]
-    traces += [_line(points, "geodesic", COLOUR["riemannian"], 7) for points in geodesics]
-    for run in in_a_row(geodesics):
-        traces.append(_mark(geodesics[run[0]][0], "start", "circle", COLOUR["riemannian"]))
-        traces += [_mark(geodesics[number][0], "via", "square", "white") for number in run[1:]]
-        traces.append(_mark(geodesics[run[-1]][-1], "goal", "diamond", "white"))
-    return traces
+    return traces + legs(geodesics, lines)
 
 
 def _obstacle(obstacle: ObstacleShape) -> list[Any]:
@@ -130,20 +128,14 @@ def _obstacle(obstacle: ObstacleShape) -> list[Any]:
         last = _in_space(obstacle.vertices + obstacle.way[-1])
         traces.append(_body(last, obstacle, f"{obstacle.name}, at the end", opacity=0.25))
         way = _in_space(obstacle.vertices.mean(axis=0) + obstacle.way)
-        traces.append(_line(way, f"{obstacle.name}, way", COLOUR["obstacle"], 3, "dot"))
+        traces.append(line(way, f"{obstacle.name}, way", COLOUR["obstacle"], 3, "dot"))
     return traces
 
 
 def _body(vertices: Points, obstacle: ObstacleShape, name: str, opacity: float) -> "Mesh3d | Scatter3d":
-    from plotly.graph_objects import Mesh3d
-
     if not len(obstacle.faces):
-        return _line(np.concatenate([vertices, vertices[:1]]), name, COLOUR["obstacle"], 5, opacity=opacity)
-    corners = dict(zip("ijk", obstacle.faces.T, strict=True))
-    places = dict(zip("xyz", vertices.T, strict=True))
-    return Mesh3d(
-        **places, **corners, color=COLOUR["obstacle"], opacity=opacity, name=name, showlegend=True, hoverinfo="name"
-    )
+        return line(np.concatenate([vertices, vertices[:1]]), name, COLOUR["obstacle"], 5, opacity=opacity)
+    return surface(vertices, obstacle.faces, name, COLOUR["obstacle"], opacity)
 
 
 def _sphere() -> list[Any]:
@@ -164,37 +156,9 @@ def _sphere() -> list[Any]:
     grid = np.concatenate([part for curve in net for part in (1.002 * curve.T, gap)])
     look: dict[str, Any] = {"showscale": False, "opacity": 0.6, "hoverinfo": "skip"}
     body = Surface(**dict(zip("xyz", surface, strict=True)), colorscale=[[0, SPHERE], [1, SPHERE]], **look)
-    lines = _line(grid, "sphere", "#BBBBBB", 1)
+    lines = line(grid, "sphere", "#BBBBBB", 1)
     lines.update(showlegend=False, hoverinfo="skip")
     return [body, lines]
-
-
-def _line(
-    points: Points, name: str, colour: str, width: float | int, dash: str = "solid", opacity: float = 1.0
-) -> "Scatter3d":
-    from plotly.graph_objects import Scatter3d
-
-    look = {"color": colour, "width": width, "dash": dash}
-    return Scatter3d(
-        **dict(zip("xyz", points.T, strict=True)), mode="lines", line=look, opacity=opacity, name=name, legendgroup=name
-    )
-
-
-def _mark(point: Float[np.ndarray, " 3"], name: str, symbol: str, colour: str) -> "Scatter3d":
-    from plotly.graph_objects import Scatter3d
-
-    look = {"symbol": symbol, "color": colour, "size": 7, "line": {"color": "black", "width": 2}}
-    x, y, z = point
-    return Scatter3d(x=[x], y=[y], z=[z], mode="markers", marker=look, name=name, legendgroup=name)
-
-
-def _named_once(traces: list[Any]) -> list[Any]:
-    """One entry in the legend for each name."""
-    seen: set[str] = set()
-    for trace in traces:
-        trace.showlegend = trace.name not in seen
-        seen.add(trace.name)
-    return traces
 
 
 def _in_space(points: Float[np.ndarray, "_ _"]) -> Points:

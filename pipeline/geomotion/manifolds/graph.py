@@ -38,18 +38,19 @@ class GeodesicGraph:
 
     An edge from i to j has the weight
 
-    .. math:: \tfrac{f_i + f_j}{2} \sqrt{\tfrac{m_i + m_j}{2} \|\Delta F_p\|^2 + \|\Delta F_o\|^2}
+    .. math:: \tfrac{f_i + f_j}{2} \sqrt{\sum_b \tfrac{m_{b,i} + m_{b,j}}{2} \|\Delta F_b\|^2 + \|\Delta F_o\|^2}
 
-    with the chord ΔF of the decoded embedding (position block, other block), the conformal factor f and the obstacles'
-    ambient factor m. Chords are more exact than products with the metric at nodes, above all where the spread rises
-    like a wall. An edge is closed where an obstacle might touch it: with the room s of a node (its distance to the
-    obstacles less the wanted clearance) and the travel L between two nodes, every point of the edge keeps a room of at
-    least (s_i + s_j - L) / 2, because distances are 1-Lipschitz.
+    with the chord ΔF of the decoded embedding (one block for each point that obstacles act on: the end effector, or
+    points of the whole body, Eq. (4.4); and one block for all other coordinates), the conformal factor f and the
+    obstacles' ambient factors m. Chords are more exact than products with the metric at nodes, above all where the
+    spread rises like a wall. An edge is closed where an obstacle might touch it: with the room s of a node (its
+    distance to the obstacles less the wanted clearance) and the travel L between two nodes, every point of the edge
+    keeps a room of at least (s_i + s_j - L) / 2, because distances are 1-Lipschitz.
 
     Args:
         grid: Latent nodes and their neighbours.
-        position: Embedded positions, one row a node.
-        rest: Embedded orientations, one row a node.
+        position: Embedded positions, one row a node, in blocks.
+        rest: Other embedded coordinates, one row a node.
         conformal: f of each node.
         travel_m: Upper bound on how far any point of interest moves along each edge [m].
 
@@ -60,7 +61,7 @@ class GeodesicGraph:
     def __init__(
         self,
         grid: LatentGrid,
-        position: Float[np.ndarray, "node P"],
+        position: Float[np.ndarray, "node B P"],
         rest: Float[np.ndarray, "other_node Q"],
         conformal: Float[np.ndarray, " another_node"],
         travel_m: Float[np.ndarray, " edge"],
@@ -73,35 +74,39 @@ class GeodesicGraph:
             if len(values) != rows:
                 raise ShapeMismatch(f"{name} of a geodesic graph", f"{rows} rows", len(values))
         ends = self.edges.T
-        self._position = np.square(np.diff(position[ends], axis=0)[0]).sum(axis=1)
-        self._rest = np.square(np.diff(rest[ends], axis=0)[0]).sum(axis=1)
+        self._position = [_squared_chords(block, ends) for block in np.moveaxis(position, 1, 0)]
+        self._moving = [number for number, chords in enumerate(self._position) if chords.any()]
+        self._rest = _squared_chords(rest, ends)
         self._stretch = conformal[ends].mean(axis=0)
+        self._free = self._stretch * np.sqrt(sum(self._position, self._rest))  # without obstacles
         self.travel_m = np.asarray(travel_m, dtype=float)
         self._lattice = Lattice(grid)
-        self._factor, self._room = np.ones(count), np.full(count, np.inf)
+        self._factor, self._room = np.ones((len(self._position), count)), np.full(count, np.inf)
         self._open = np.ones(count, dtype=bool)
         self._felt = np.zeros(0, dtype=np.intp)  # nodes that obstacles changed last time
+        self._touched: tuple[Int[np.ndarray, " node"], list[BoxedEdges | ListedEdges]] | None = None
+        self._is_soft = False  # whether a factor is not one
         self._goal: int | None = None
         self._ahead = np.zeros(count)  # least cost to this goal without obstacles; zero without a goal
         self.weights = np.empty(len(self.edges))
         self._update(self._lattice.everywhere())
 
     @property
-    def factor(self) -> Float[np.ndarray, " node"]:
-        """Ambient factor of the obstacles felt now."""
+    def factor(self) -> Float[np.ndarray, "B node"]:
+        """Ambient factors of the obstacles felt now, of each block."""
         return self._factor
 
     @property
     def nodes(self) -> int:
         """Number of nodes."""
-        return len(self._factor)
+        return len(self._room)
 
     @property
     def memory_bytes(self) -> int:
         """Bytes of all arrays held here."""
         matrix = self._lattice.matrix
         held = [value for value in vars(self).values() if isinstance(value, np.ndarray)]
-        held += [matrix.data, matrix.indices, matrix.indptr, self._lattice.incident]
+        held += [*self._position, matrix.data, matrix.indices, matrix.indptr, self._lattice.incident]
         return sum(value.nbytes for value in held)
 
     def close(self, closed: Bool[np.ndarray, " node"]) -> None:
@@ -109,6 +114,7 @@ class GeodesicGraph:
         if not (self._open == closed).any():
             return
         self._open, self._goal, self._ahead = ~closed, None, np.zeros(self.nodes)
+        self._touched = None
         self._update(self._lattice.everywhere())
 
     def set_travel(self, travel_m: Float[np.ndarray, " edge"]) -> None:
@@ -119,21 +125,32 @@ class GeodesicGraph:
     def feel(
         self,
         nodes: Int[np.ndarray, " felt"],
-        factor: Float[np.ndarray, " felt"],
+        factor: Float[np.ndarray, "B felt"],
         room_m: Float[np.ndarray, " felt"],
     ) -> None:
         """Put obstacles where they are now; every other node is freed of where they were.
 
         Args:
             nodes: Nodes in their reach. Nodes left out must have room for all their edges.
-            factor: m of Eq. (3.15) there.
+            factor: m of Eq. (3.15) there, of each block.
             room_m: Distance to the nearest obstacle less the wanted clearance there [m].
         """
-        self._factor[self._felt], self._room[self._felt] = 1.0, np.inf
-        self._factor[nodes], self._room[nodes] = factor, room_m
+        self._room[self._felt] = np.inf
+        self._room[nodes] = room_m
+        becomes_soft = bool((np.asarray(factor) != 1).any())
+        if self._is_soft or becomes_soft:
+            self._factor[:, self._felt] = 1.0
+            self._factor[:, nodes] = factor
         touched = np.concatenate([self._felt, nodes])
-        self._felt = np.asarray(nodes, dtype=np.intp)
-        self._update(self._lattice.touching(touched))
+        self._felt, self._is_soft = np.asarray(nodes, dtype=np.intp), self._is_soft or becomes_soft
+        self._update(self._open_edges(touched))
+        self._is_soft = becomes_soft
+
+    def shut(self, nodes: Int[np.ndarray, " some"]) -> None:
+        """Leave further nodes out of every path until obstacles are put anew."""
+        self._room[nodes] = -np.inf
+        self._felt = np.union1d(self._felt, nodes)
+        self._update(self._lattice.touching(np.asarray(nodes, dtype=np.intp)))
 
     def is_free(self, nodes: Int[np.ndarray, " some"]) -> Bool[np.ndarray, " some"]:
         """Whether nodes are open and outside what obstacles take."""
@@ -148,7 +165,7 @@ class GeodesicGraph:
             guess: A path to the same goal, for example under other obstacles. The search then heads for the goal and,
                 if the start is the same, is bounded by the guess' cost under the present weights; it stays exact.
         """
-        adds = self._factor[self._felt].min(initial=1.0) >= 1  # else what is left to the goal is no lower bound
+        adds = self._factor[:, self._felt].min(initial=1.0) >= 1  # else what is left to the goal is no lower bound
         if guess is None or len(guess.nodes) == 0 or guess.nodes[-1] != goal or not adds:
             self._head_for(None)
             return self._search(start, goal, np.inf)
@@ -197,8 +214,7 @@ class GeodesicGraph:
             return
         self._goal, self._ahead = goal, np.zeros(self.nodes)
         if goal is not None:
-            free = self._stretch * np.sqrt(self._position + self._rest)
-            self._direct(np.where(self._open[self.edges].all(axis=1), free, np.inf))
+            self._direct(np.where(self._open[self.edges].all(axis=1), self._free, np.inf))
             costs = dijkstra(self._lattice.matrix, directed=True, indices=goal)
             self._ahead = np.where(np.isfinite(costs), costs, 0.0)
         self._direct(self.weights)
@@ -212,13 +228,50 @@ class GeodesicGraph:
         gain = second - first
         edges.direct(self._lattice.matrix.data, np.maximum(weights + gain, 0), np.maximum(weights - gain, 0))
 
+    def _under_factors(self, edges: BoxedEdges | ListedEdges) -> Float[np.ndarray, "..."]:
+        squares = edges.of(self._rest)
+        for block in self._moving:
+            first, second = edges.ends(self._factor[block])
+            mean = first + second
+            mean /= 2
+            mean *= edges.of(self._position[block])
+            squares = np.add(squares, mean, out=mean)
+        return np.asarray(edges.of(self._stretch) * np.sqrt(squares))
+
+    def _open_edges(self, nodes: Int[np.ndarray, " some"]) -> list[BoxedEdges | ListedEdges]:
+        """Edges at nodes, listed ones only if both ends are open; the same ones again while the nodes are the same."""
+        is_meant = np.zeros(self.nodes, dtype=bool)
+        is_meant[nodes] = True
+        meant = np.flatnonzero(is_meant)
+        if self._touched is None or not np.array_equal(self._touched[0], meant):
+            edges = [
+                one.only(np.logical_and(*one.ends(self._open))) if isinstance(one, ListedEdges) else one
+                for one in self._lattice.touching(meant)
+            ]
+            self._touched = meant, edges
+        return self._touched[1]
+
     def _update(self, touched: Iterable[BoxedEdges | ListedEdges]) -> None:
         """Weigh some edges anew."""
         for edges in touched:
-            (first, second), (room, other) = edges.ends(self._factor), edges.ends(self._room)
-            squares = (first + second) / 2 * edges.of(self._position) + edges.of(self._rest)
-            weights = edges.of(self._stretch) * np.sqrt(squares)
+            weights = self._under_factors(edges) if self._is_soft else edges.of(self._free).copy()
+            room, other = edges.ends(self._room)
             opened, other_opened = edges.ends(self._open)
-            weights[~(opened & other_opened & (room + other >= edges.of(self.travel_m)))] = np.inf
+            with np.errstate(invalid="ignore"):  # -∞ of a shut node and ∞ of a free one: not enough
+                weights[~(opened & other_opened & (room + other >= edges.of(self.travel_m)))] = np.inf
+            if isinstance(edges, ListedEdges):  # in no order, so that storing them costs more than looking which differ
+                is_new = weights != edges.of(self.weights)
+                edges, weights = edges.only(is_new), weights[is_new]
             edges.put(self.weights, weights)
             self._store(edges, weights)
+
+
+def _squared_chords(
+    embedded: Float[np.ndarray, "node k"], ends: Int[np.ndarray, "2 edge"]
+) -> Float[np.ndarray, " edge"]:
+    """Axis by axis: all at once, the differences alone would be the largest array of the graph."""
+    squares = np.zeros(ends.shape[1])
+    for axis in embedded.T:
+        values = axis[ends]
+        squares += np.square(values[1] - values[0])
+    return squares

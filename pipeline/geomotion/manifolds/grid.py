@@ -10,8 +10,9 @@ from jaxtyping import Bool, Float, Int
 
 from geomotion.errors import InvalidSetting, TooLargeForMemory
 
-BYTES_PER_EDGE = 120  # two squared chords, weight, ends, two stored directions with their numbers
-BYTES_PER_NODE = 400  # decoded pose, support, factors, incidence
+BYTES_PER_EDGE = 120  # squared chord, stretch, weights, ends, two stored directions with their numbers
+BYTES_PER_NODE = 400  # decoded state, support, incidence
+BYTES_PER_BLOCK = 8, 40  # of an edge: squared chord; of a node: embedded position and factor
 
 
 @dataclass(frozen=True)
@@ -110,13 +111,21 @@ class LatentGrid:
         return numbers, shares
 
 
-def memory_bytes(points_per_axis: int, dim: int) -> int:
-    """What a graph on such a grid takes, estimated from above without allocating it."""
-    return int(points_per_axis**dim * (BYTES_PER_NODE + BYTES_PER_EDGE * (3**dim - 1) // 2))
+def memory_bytes(points_per_axis: int, dim: int, blocks: int = 1) -> int:
+    """What a graph on such a grid takes, estimated from above without allocating it.
+
+    Args:
+        points_per_axis: Nodes along each axis.
+        dim: Number of axes.
+        blocks: Points that obstacles act on.
+    """
+    edges = (3**dim - 1) // 2
+    per_edge, per_node = BYTES_PER_EDGE + blocks * BYTES_PER_BLOCK[0], BYTES_PER_NODE + blocks * BYTES_PER_BLOCK[1]
+    return int(points_per_axis**dim * (per_node + per_edge * edges))
 
 
-def require_memory(points_per_axis: int, dim: int, limit_bytes: int) -> None:
-    """Check that a grid fits before it is made.
+def require_memory(points_per_axis: int, dim: int, limit_bytes: int, blocks: int = 1) -> None:
+    """Check that a grid fits before it is made; the arguments are those of :func:`memory_bytes`.
 
     Raises:
         InvalidSetting: If an axis has fewer than two points.
@@ -124,9 +133,9 @@ def require_memory(points_per_axis: int, dim: int, limit_bytes: int) -> None:
     """
     if points_per_axis < 2:
         raise InvalidSetting("graph.points_per_axis", points_per_axis, "2 or more")
-    needed = memory_bytes(points_per_axis, dim)
+    needed = memory_bytes(points_per_axis, dim, blocks)
     if needed > limit_bytes:
-        fitting = int((limit_bytes / memory_bytes(1, dim)) ** (1 / dim))
+        fitting = int((limit_bytes / memory_bytes(1, dim, blocks)) ** (1 / dim))
         raise TooLargeForMemory(
             f"a latent grid of {points_per_axis}^{dim} nodes", needed, limit_bytes, f"graph.points_per_axis={fitting}"
         )

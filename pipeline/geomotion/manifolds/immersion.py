@@ -12,10 +12,11 @@ Conformal = Callable[[Tensor], Tensor]
 
 @runtime_checkable
 class Immersion(Protocol):
-    """A map of latent points into a Euclidean space, in two blocks of coordinates.
+    """A map of latent points into a Euclidean space, in blocks of coordinates.
 
     Its pulled-back metric is the expected metric of a stochastic decoder if the coordinates are the decoder's means and
-    standard deviations, Eq. (2.10), (2.11). Positions stand apart because obstacles act on them alone, Eq. (3.16).
+    standard deviations, Eq. (2.10), (2.11). Positions stand apart because obstacles act on them alone, Eq. (3.16), on
+    each by a factor of its own, Eq. (4.4): B of them are the end effector alone, or points of the whole body.
 
     Attributes:
         latent_dim: d.
@@ -23,10 +24,10 @@ class Immersion(Protocol):
 
     latent_dim: int
 
-    def blocks(self, z: Latent) -> tuple[Float[Tensor, "*batch P"], Float[Tensor, "*batch Q"]]:
-        """Coordinates that belong to positions, and all others."""
+    def blocks(self, z: Latent) -> tuple[Float[Tensor, "*batch B P"], Float[Tensor, "*batch Q"]]:
+        """Coordinates that belong to each position, and all others."""
         ...
 
-    def position(self, z: Latent) -> Float[Tensor, "*batch Dx"]:
-        """Mean position in space [m], where obstacles are."""
+    def positions(self, z: Latent) -> Float[Tensor, "*batch B Dx"]:
+        """Mean positions in space [m], where obstacles are."""
         ...

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Int, Shaped
+from jaxtyping import Bool, Int, Shaped
 from scipy.sparse import csr_array
 
 from geomotion.manifolds.grid import LatentGrid
@@ -84,6 +84,11 @@ class ListedEdges:
     def put(self, values: Shaped[np.ndarray, " every_edge"], new: Values) -> None:
         values[self.numbers] = new
 
+    def only(self, which: Bool[np.ndarray, " edge"]) -> "ListedEdges":
+        """Some of them."""
+        some = np.flatnonzero(which)
+        return ListedEdges(*(getattr(self, one.name)[some] for one in fields(self)))
+
     def direct(self, entries: Shaped[np.ndarray, " entry"], there: Values, back: Values) -> None:
         entries[self.there], entries[self.back] = there, back
 
@@ -103,6 +108,8 @@ class Lattice:
         self.shape, self.steps, self._edges = grid.shape, grid.steps, grid.edges
         extents = [tuple(n - abs(one) for n, one in zip(self.shape, step, strict=True)) for step in self.steps]
         self._begins = np.cumsum([0, *map(math.prod, extents)])
+        strides = np.cumprod([1, *self.shape[:0:-1]])[::-1]
+        self._offsets = np.array(self.steps) @ strides  # from the number of an edge's first end to that of its second
         count, width = math.prod(self.shape), 2 * len(self.steps)
         nodes = np.arange(count, dtype=np.int32)
         columns, incident = np.repeat(nodes, width), np.full(count * width, len(self._edges), dtype=np.int32)
@@ -154,10 +161,17 @@ class Lattice:
             )
 
     def _listed(self, nodes: Int[np.ndarray, " some"]) -> ListedEdges:
-        is_meant = np.zeros(len(self._edges) + 1, dtype=bool)
-        is_meant[self.incident[nodes]] = True
-        numbers = np.flatnonzero(is_meant[:-1])
-        first, second = self._edges[numbers].T
-        width, columns = 2 * len(self.steps), np.searchsorted(self._begins, numbers, side="right") - 1
-        back = columns + len(self.steps)
-        return ListedEdges(numbers, first, second, first * width + columns, second * width + back)
+        """Step by step, the edges that begin at the nodes, and those that end there and begin elsewhere."""
+        is_meant = np.zeros(len(self.incident), dtype=bool)
+        is_meant[nodes] = True
+        meant, count, last = np.flatnonzero(is_meant), len(self.steps), len(self._edges)
+        incident = self.incident[meant]
+        first = []
+        for column, offset in enumerate(self._offsets):
+            before = meant[incident[:, column + count] < last] - offset
+            first.append(np.concatenate([meant[incident[:, column] < last], before[~is_meant[before]]]))
+        columns = np.repeat(np.arange(count), [len(one) for one in first])
+        begins = np.concatenate(first)
+        ends = begins + self._offsets[columns]
+        there, back = begins * 2 * count + columns, ends * 2 * count + columns + count
+        return ListedEdges(self.incident.ravel()[there], begins, ends, there, back)

@@ -10,19 +10,19 @@ from geomotion.manifolds.immersion import Conformal, Immersion, Latent
 from geomotion.types import Float, Tensor
 
 AmbientFactor = Callable[[Tensor], Tensor]
-"""Positions (*batch, Dx) [m] → factor m ≥ 1 by which obstacles scale the position block of the ambient metric."""
+"""Positions (*batch, Dx) [m] → factors m ≥ 1 by which obstacles scale their blocks of the ambient metric."""
 SMALLEST_VOLUME = 1e-300
 
 
 class PullbackMetric:
-    r"""M(z) = f(z)² (J_pᵀ m(x) J_p + J_oᵀ J_o), with the Jacobians of the immersion's two blocks.
+    r"""M(z) = f(z)² (Σ_b J_bᵀ m(x_b) J_b + J_oᵀ J_o), with the Jacobians of the immersion's blocks.
 
     Args:
         immersion: Decoder.
-        ambient: m of Eq. (3.15), (3.16); 1 if omitted.
+        ambient: m of Eq. (3.15), (3.16), (4.4); 1 if omitted.
         conformal: f; 1 if omitted, which is the thesis' metric.
 
-    Source: Thesis Eq. (2.11), (2.13), (3.9)-(3.18).
+    Source: Thesis Eq. (2.11), (2.13), (3.9)-(3.18), (4.3), (4.4).
     """
 
     def __init__(
@@ -41,10 +41,10 @@ class PullbackMetric:
             raise ShapeMismatch("latent points", f"{dim} coordinates", z.shape[-1])
         points = z.reshape(-1, dim)
         of_position, of_rest = vmap(jacfwd(self.immersion.blocks))(points)
-        metric: Tensor = of_position.mT @ of_position
+        blocks = of_position.mT @ of_position
         if self.ambient is not None:
-            metric = self.ambient(self.immersion.position(points))[:, None, None] * metric
-        metric = metric + of_rest.mT @ of_rest
+            blocks = self.ambient(self.immersion.positions(points))[..., None, None] * blocks
+        metric: Tensor = blocks.sum(dim=1) + of_rest.mT @ of_rest
         if self.conformal is not None:
             metric = self.conformal(points).square()[:, None, None] * metric
         return metric.reshape(*z.shape, dim)

@@ -13,6 +13,9 @@ from geomotion.networks.rbf import RadialBasisNetwork
 from geomotion.types import Float, Tensor
 
 LOG_VARIANCE_RANGE = (-14.0, 4.0)
+TYPICAL_STD = 0.03  # where the spreads start, in units of the data's size
+TYPICAL_CONCENTRATION = 1000.0
+SPREADS = ("precision", "concentration")  # parts of networks that are fitted after the means
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,22 @@ class PoseVAE(nn.Module):
         output = self.decoder(z)
         position, orientation, progress = torch.split(output, [self.position_dim, self.orientation_dim, 1], dim=-1)
         return DecodedPose(position, normalize(orientation, dim=-1), progress[..., 0])
+
+    def reconstruct(self, z: Float[Tensor, "*batch d"]) -> tuple[Float[Tensor, "*batch D"], Float[Tensor, "*batch"]]:
+        """Means at latent points as one vector, and the progress."""
+        decoded = self.decode(z)
+        return torch.cat([decoded.position, decoded.orientation], dim=-1), decoded.progress
+
+    def blocks(
+        self, z: Float[Tensor, "*batch d"], raw: bool = False
+    ) -> tuple[Float[Tensor, "*batch 1 P"], Float[Tensor, "*batch Q"]]:
+        """What the metric is pulled back from: the position's block, and the orientation's."""
+        return self.embed_position(z)[..., None, :], self.embed_orientation(z, raw)
+
+    def place_kernels(self, centres: Float[Tensor, "kernel d"], width: float) -> None:
+        """Put the kernels of both spreads there."""
+        self.precision.place(centres, width, 1 / TYPICAL_STD)
+        self.concentration.place(centres, width, TYPICAL_CONCENTRATION)
 
     def std(self, z: Float[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """σ of every coordinate of the position [position_scale]."""

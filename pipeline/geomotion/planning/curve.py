@@ -11,9 +11,9 @@ from jaxtyping import Float
 from geomotion.manifolds.curves import descend
 from geomotion.manifolds.graph import GeodesicGraph, GraphPath
 from geomotion.manifolds.spline import LatentSpline, fit_spline, polyline
-from geomotion.planning.carrying import Offsets, meet
+from geomotion.planning.carrying import Offsets, carried_to
 from geomotion.planning.manifold import Codes, DecodedPath, SkillManifold, Surface
-from geomotion.scores.paths import PosePath
+from geomotion.scores.paths import MotionPath
 
 if TYPE_CHECKING:
     from geomotion.planning.planner import PlannerSettings
@@ -28,7 +28,7 @@ class FittedCurve:
 
     Attributes:
         codes: Latent points, shape (point, d).
-        path: Decoded and carried poses, with progress.
+        path: Decoded and carried states, with progress.
         length: Its length in the metric that was planned in.
         graph_length: That of the graph path.
     """
@@ -43,7 +43,7 @@ def fit_curve(
     manifold: SkillManifold,
     surface: Surface,
     offsets: Offsets,
-    ends: PosePath,
+    ends: MotionPath,
     found: GraphPath,
     graph: GeodesicGraph,
     settings: "PlannerSettings",
@@ -62,7 +62,7 @@ def fit_curve(
             codes, length = points, smooth_length
             break
     decoded = manifold.decode(codes)
-    carried = meet(offsets.carry(decoded.poses, decoded.progress), ends)
+    carried = carried_to(decoded.states, ends, decoded.progress, offsets)
     return FittedCurve(codes, DecodedPath(carried, decoded.progress), length, found.cost)
 
 
@@ -81,12 +81,13 @@ def _length(surface: Surface, graph: GeodesicGraph, points: Float[np.ndarray, "p
     """Length in the metric that the graph has now, from values interpolated between its nodes."""
     numbers, shares = surface.grid.corners(points)
     along = np.einsum("pc,pck->pk", shares, surface.columns[numbers])
-    factor = np.einsum("pc,pc->p", shares, graph.factor[numbers])
+    factor = np.einsum("pc,bpc->pb", shares, graph.factor[:, numbers])
     squares = np.square(np.diff(along[:, :-1], axis=0))
-    width = surface.position.shape[1]
-    position, rest = squares[:, :width].sum(axis=1), squares[:, width:].sum(axis=1)
+    blocks, width = surface.position.shape[1:]
+    position = squares[:, : blocks * width].reshape(len(squares), blocks, width).sum(axis=2)
+    rest = squares[:, blocks * width :].sum(axis=1)
     stretch, factor = ((value[1:] + value[:-1]) / 2 for value in (along[:, -1], factor))
-    return float((stretch * np.sqrt(factor * position + rest)).sum())
+    return float((stretch * np.sqrt((factor * position).sum(axis=1) + rest)).sum())
 
 
 def _refined(manifold: SkillManifold, spline: LatentSpline, settings: "PlannerSettings") -> LatentSpline:

@@ -1,6 +1,7 @@
 """Why there is no path: obstacles by name, or the cap on how far a path may leave the demonstrations."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,14 +10,19 @@ from geomotion.obstacles.motion import MovingBody
 from geomotion.planning.plan import Plan, PlanStatus
 
 if TYPE_CHECKING:
-    from geomotion.planning.planner import Planner, Query
+    from geomotion.planning.ends import Query
+    from geomotion.planning.planner import Planner
 
 NO_CODES = np.zeros((0, 0))
 
 
 def diagnose(planner: "Planner", query: "Query", bodies: Sequence[MovingBody], time_s: float) -> Plan:
     """Take obstacles away, one and then all, and see what a path needs."""
-    if not planner.search(query, (), time_s, 0.0).exists:
+    if not planner.search(query, (), time_s).exists:
+        crossing = replace(query, is_open=query.is_within)
+        found = planner.search(crossing, (), time_s)
+        if found.exists:
+            return planner.judged(crossing, planner.fit(crossing, found), np.inf)
         settings = planner.settings
         limits = f"{1000 * settings.cap_m:.0f} mm and {np.degrees(settings.cap_rad):.0f} deg"
         reason = (

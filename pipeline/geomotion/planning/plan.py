@@ -1,4 +1,4 @@
-"""What comes out of planning: a path of poses with what is known about it, or the reason why there is none."""
+"""What comes out of planning: a path with what is known about it, or the reason why there is none."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -21,6 +21,9 @@ class PlanStatus(Enum):
     blocked = "obstacles block every way inside the demonstrations"
     cap_reached = "start and goal are joined only by leaving the demonstrations farther than allowed"
     crosses = "the way crosses a region without data"
+    joint_limit = "a joint would go beyond its limit"
+    self_collision = "the arm would collide with itself"
+    touches = "a link would come too near to an obstacle"
 
 
 @dataclass(frozen=True)
@@ -32,11 +35,11 @@ class PathScores:
         graph_length: The same of the graph path that it was fitted to.
         energy: Energy in the thesis' metric, without conformal factor.
         line_energy: Energy of the straight latent line between the same ends.
-        clearance_m: Guaranteed distance between the tool and obstacles along the path [m]; infinite without obstacles.
-        apart_m: Farthest distance to the demonstrations [m].
-        apart_rad: Largest angle to the orientations demonstrated nearby [rad].
+        clearance_m: Guaranteed distance between the robot and obstacles along the path [m]; infinite without obstacles.
+        apart_m: Farthest distance of the end effector to the demonstrations [m].
+        apart_rad: Largest angle to the orientations, or distance to the configurations, demonstrated nearby [rad].
         start_residual_m: How far the manifold is from the wanted start [m]; bridged by carrying the path there.
-        start_residual_rad: The same in orientation [rad].
+        start_residual_rad: The same in angles [rad].
         goal_residual_m: The same at the goal.
         goal_residual_rad: The same at the goal.
     """
@@ -62,7 +65,7 @@ class Plan:
         status: How it ended.
         reason: One sentence for people.
         codes: Latent path, shape (point, d); empty if there is none.
-        path: Poses to execute and their progress; None if there is none.
+        path: States to execute and their progress; None if there is none.
         scores: What is known about it; None if there is none.
         blocking: Names of the obstacles in the way, where there is none.
     """

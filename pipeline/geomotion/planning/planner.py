@@ -1,43 +1,27 @@
 """From start and goal to a path on the manifold, around obstacles, within the demonstrations."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.spatial.distance import cdist
 
 from geomotion.errors import ShapeMismatch
 from geomotion.manifolds.graph import GeodesicGraph, GraphPath
 from geomotion.obstacles.motion import MovingBody
-from geomotion.planning.carrying import Offsets
+from geomotion.planning.clearance import kept_clearances
 from geomotion.planning.curve import FittedCurve, fit_curve
 from geomotion.planning.diagnosis import diagnose
+from geomotion.planning.ends import Anchors, Ends, Query
 from geomotion.planning.manifold import Codes, SkillManifold, Surface
-from geomotion.planning.obstruction import Constraint, Tool, distances, feel, travel_m
+from geomotion.planning.obstruction import Constraint, RobotShape, Tool, closer_look, distances, feel
 from geomotion.planning.plan import PathScores, Plan, PlanStatus
-from geomotion.scores.paths import PosePath, orientation_angles
-from geomotion.scores.pose_support import PoseSupport
+from geomotion.scores.paths import MotionPath
+from geomotion.scores.pose_support import Support
 
 NO_CODES = np.zeros((0, 0))
-EXTRA_CLEARANCES_M = (0.0, 0.004, 0.01)  # tried on the graph until the fitted curve keeps the wanted one
-CHECKED_STEP_M = 0.002  # of the tool, between poses whose distance to obstacles is looked at
-MOST_STEPS = 50  # for each step of a path
-NOTHING = np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0)
-
-
-@dataclass(frozen=True)
-class Anchors:
-    """Where the demonstrations of each group begin or end.
-
-    Attributes:
-        codes: Their mean latent point for each group, shape (group, d).
-        poses: What these decode to.
-        radii: Largest distance of a demonstrated end from that pose, in units of the manifold's scale, for each group.
-    """
-
-    codes: Codes
-    poses: PosePath
-    radii: Float[np.ndarray, " group"]
+ROUTES = 40  # tried until the curve fitted to one keeps the wanted clearance
 
 
 @dataclass(frozen=True)
@@ -49,11 +33,13 @@ class PlannerSettings:
         cap_rad: The same in orientation [rad].
         end_cap_m: How far from the demonstrations start and goal may be [m].
         end_cap_rad: The same in orientation [rad].
-        tool: What must not touch obstacles.
+        shape: What must not touch obstacles.
         constraint: How obstacles act.
         control_points: Of the spline through the graph path; doubled where the spline would leave the path's tube.
         samples: Points of the resulting path.
         refine_steps: Gradient steps on the spline's energy; 0 for none.
+        closes_edges: Whether an edge is closed if an obstacle might touch it. Where the travel along edges is long, or
+            hardly known, that leaves no way; False leaves it to the check of the curve.
         crossing_length: Length, in the thesis' metric, above which a path counts as crossing a region without data.
     """
 
@@ -61,39 +47,13 @@ class PlannerSettings:
     cap_rad: float
     end_cap_m: float = np.inf
     end_cap_rad: float = np.inf
-    tool: Tool = field(default_factory=Tool)
+    shape: RobotShape = field(default_factory=Tool)
     constraint: Constraint = field(default_factory=Constraint)
     control_points: int = 12
     samples: int = 200
     refine_steps: int = 0
+    closes_edges: bool = True
     crossing_length: float = np.inf
-
-
-@dataclass(frozen=True)
-class Query:
-    """Start and goal with the surface carried there: everything that obstacles do not change.
-
-    Attributes:
-        start: Node.
-        goal: Node.
-        offsets: What carries the skill to the wanted poses.
-        ends: The wanted poses.
-        poses: Carried poses of all nodes.
-        points_m: Balls of the tool there.
-        is_open: Nodes that paths may use.
-        travel_m: How far a ball of the tool moves along each edge, at most [m].
-        longest_travel_m: The same for the longest edge that paths may use [m].
-    """
-
-    start: int
-    goal: int
-    offsets: Offsets
-    ends: PosePath
-    poses: PosePath
-    points_m: Float[np.ndarray, "node ball Dx"]
-    is_open: Bool[np.ndarray, " node"]
-    travel_m: Float[np.ndarray, " edge"]
-    longest_travel_m: float
 
 
 @dataclass(frozen=True)
@@ -103,7 +63,7 @@ class Route:
     Attributes:
         found: On the graph.
         curve: To execute.
-        clearance_m: Distance between tool and obstacles that it surely keeps [m].
+        clearance_m: Distance between robot and obstacles that it surely keeps [m].
     """
 
     found: GraphPath
@@ -117,7 +77,7 @@ class Planner:
     Args:
         manifold: Decoder.
         surface: Its decoded grid.
-        support: The demonstrated poses.
+        support: The demonstrated states.
         starts: Where demonstrations begin.
         goals: Where they end.
         settings: How to plan.
@@ -127,19 +87,21 @@ class Planner:
         self,
         manifold: SkillManifold,
         surface: Surface,
-        support: PoseSupport,
+        support: Support,
         starts: Anchors,
         goals: Anchors,
         settings: PlannerSettings,
     ) -> None:
         self.manifold, self.surface, self.support, self.settings = manifold, surface, support, settings
-        self._anchors = (starts, goals)
-        travel = travel_m(surface.decoded.poses, surface.grid.edges, settings.tool)
-        self.graph = GeodesicGraph(surface.grid, surface.position, surface.rest, surface.stretch, travel)
-        self._is_open = surface.within(settings.cap_m, settings.cap_rad)
+        nowhere = np.zeros(len(surface.grid.edges))  # until a query says how far the robot moves along edges
+        self.graph = GeodesicGraph(surface.grid, surface.position, surface.rest, surface.stretch, nowhere)
+        is_within = surface.within(settings.cap_m, settings.cap_rad)
+        self.ends = Ends(
+            manifold, surface, starts, goals, settings.shape, is_within, settings.closes_edges, settings.crossing_length
+        )
 
     # ------------------------------------------------------------ start and goal
-    def pose_at(self, code: Float[np.ndarray, " d"]) -> PosePath:
+    def state_at(self, code: Float[np.ndarray, " d"]) -> MotionPath:
         """What a latent point decodes to.
 
         Raises:
@@ -147,84 +109,27 @@ class Planner:
         """
         if len(code) != self.manifold.latent_dim:
             raise ShapeMismatch("a latent point", f"{self.manifold.latent_dim} coordinates", len(code))
-        return self.manifold.decode(np.asarray(code, dtype=float)[None]).poses
+        return self.manifold.decode(np.asarray(code, dtype=float)[None]).states
 
-    def query(self, start: PosePath, goal: PosePath, codes: tuple[Codes | None, Codes | None] = (None, None)) -> Query:
-        """Find the nodes for two poses and carry the surface there.
+    def query(
+        self, start: MotionPath, goal: MotionPath, codes: tuple[Codes | None, Codes | None] = (None, None)
+    ) -> Query:
+        """Find the nodes for two states and carry the surface there.
 
         Args:
-            start: One pose.
-            goal: One pose.
+            start: One state.
+            goal: One state.
             codes: Latent points of start and goal, shape (1, d), where they are known.
         """
-        is_open = self._is_open.copy()
-        first = self._node(start, codes[0], self._anchors[0])
-        is_open[first] = True
-        self.graph.close(~is_open)
-        self.graph.feel(*NOTHING)
-        last = self._node(goal, codes[1], self._anchors[1], first)
-        is_open[last] = True
-        decoded, ends = self.surface.decoded, _joined(start, goal)
-        ends = self._with_signs_of(ends, np.array([first, last]))
-        offsets = Offsets.between(decoded.poses, ends, decoded.progress, (first, last))
-        poses = offsets.carry(decoded.poses, decoded.progress)
-        edges, tool = self.surface.grid.edges, self.settings.tool
-        travel = travel_m(poses, edges, tool)
-        longest = float(travel[is_open[edges].all(axis=1)].max(initial=0.0))
-        query = Query(first, last, offsets, ends, poses, tool.points(poses), is_open, travel, longest)
+        query = self.ends.query(self.graph, start, goal, codes)
         self._take_up(query)
         return query
-
-    def onward(self, query: Query, node: int, pose: PosePath | None = None) -> Query:
-        """The same query from a node on the way, at the pose where the robot is; at that of the node if omitted."""
-        here = query.poses[node : node + 1] if pose is None else pose
-        ends = self._with_signs_of(_joined(here, query.ends), np.array([node, query.goal]))
-        return replace(query, start=node, ends=ends)
 
     def _take_up(self, query: Query) -> None:
         """Let the graph be what the query sees, where another one was planned meanwhile."""
         self.graph.close(~query.is_open)
         if self.graph.travel_m is not query.travel_m:
             self.graph.set_travel(query.travel_m)
-
-    def _node(self, pose: PosePath, code: Codes | None, anchors: Anchors, reached_from: int | None = None) -> int:
-        """The node of a known code, else of an anchor that is as near as demonstrations are, else the nearest."""
-        if code is not None:
-            return int(self.surface.grid.nearest(code)[0])
-        apart = self._separation(anchors.poses, pose)
-        nearest = int((apart / np.maximum(anchors.radii, np.finfo(float).tiny)).argmin())
-        if apart[nearest] <= anchors.radii[nearest]:
-            return int(self.surface.grid.nearest(anchors.codes[nearest : nearest + 1])[0])
-        return self._nearest_node(pose, reached_from)
-
-    def _nearest_node(self, pose: PosePath, reached_from: int | None) -> int:
-        apart = np.where(self._is_open, self._separation(self.surface.decoded.poses, pose), np.inf)
-        if reached_from is None or not np.isfinite(apart.min()):
-            return int(apart.argmin())
-        connected = np.isfinite(self.graph.costs_from(reached_from))
-        among = np.where(connected, apart, np.inf)
-        return int(among.argmin()) if among.min() <= 2 * apart.min() + self.cell_size() else int(apart.argmin())
-
-    def cell_size(self) -> float:
-        """Median distance between the poses of neighbouring open nodes, in units of the manifold's scale."""
-        edges = self.surface.grid.edges[self._is_open[self.surface.grid.edges].all(axis=1)]
-        poses = self.surface.decoded.poses
-        steps = poses.position_m[edges[:, 1]] - poses.position_m[edges[:, 0]]
-        return float(np.median(np.linalg.norm(steps, axis=1)) / self.manifold.scale_m) if len(edges) else 0.0
-
-    def _separation(self, poses: PosePath, pose: PosePath) -> Float[np.ndarray, " pose"]:
-        """Distances to one pose, whatever the sign of its orientation, in units of the manifold's scale."""
-        across = (poses.position_m - pose.position_m) / self.manifold.scale_m
-        cosine = np.abs(poses.orientation @ pose.orientation[0])
-        return np.asarray(np.sqrt(np.square(across).sum(axis=1) + 2 * (1 - cosine.clip(max=1))))
-
-    def _with_signs_of(self, ends: PosePath, nodes: Int[np.ndarray, " end"]) -> PosePath:
-        """±q are one orientation: take the sign that the surface has there."""
-        known = self.surface.decoded.poses.orientation[nodes]
-        if ends.orientation.shape[1] == 3:
-            return ends
-        signs = np.where((known * ends.orientation).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
-        return PosePath(ends.position_m, signs * ends.orientation)
 
     # ------------------------------------------------------------ planning
     def plan(
@@ -248,51 +153,94 @@ class Planner:
         route = self.route(query, bodies, time_s, guess)
         if route is None:
             return diagnose(self, query, bodies, time_s)
-        return self._judged(query, route.curve, route.clearance_m)
+        return self.judged(query, route.curve, route.clearance_m)
 
     def route(
-        self, query: Query, bodies: Sequence[MovingBody], time_s: float, guess: GraphPath | None = None
+        self,
+        query: Query,
+        bodies: Sequence[MovingBody],
+        time_s: float,
+        guess: GraphPath | None = None,
+        closely: bool = True,
     ) -> Route | None:
-        """The shortest way whose curve keeps the clearance, if it has to; none where there is no such way."""
+        """The shortest way whose curve keeps the clearance, if it has to; none where there is no such way.
+
+        Args:
+            query: Start and goal.
+            bodies: Obstacles.
+            time_s: When they are looked at.
+            guess: The last graph path of the same query; the search is faster with it.
+            closely: Whether the robot is looked at in smaller balls before it is said that there is no way.
+        """
+        found = self._route(query, bodies, time_s, guess, closely=False)
+        if found is None and closely and bodies and self.settings.shape.finer is not None:
+            found = self._route(query, bodies, time_s, guess, closely=True)
+        return found
+
+    def _route(
+        self, query: Query, bodies: Sequence[MovingBody], time_s: float, guess: GraphPath | None, closely: bool
+    ) -> Route | None:
         constraint = self.settings.constraint
-        for extra in EXTRA_CLEARANCES_M:
-            found = self.search(query, bodies, time_s, extra, guess)
+        self.sense(query, bodies, time_s, closely)
+        for _ in range(ROUTES):
+            found = self.graph.shortest_path(query.start, query.goal, guess)
             if not found.exists:
                 return None
             curve = self.fit(query, found)
-            clearance = self.clearance(query, curve, bodies, time_s)
-            if clearance >= constraint.clearance_m or not constraint.hard:
-                return Route(found, curve, clearance)
+            kept = self.clearances(curve, bodies, time_s, closely)
+            if not constraint.hard or kept.min(initial=np.inf) >= constraint.clearance_m:
+                return Route(found, curve, float(kept.min(initial=np.inf)))
+            self.graph.shut(self._near(query, found, curve, kept < constraint.clearance_m))
+            guess = found
         return None
 
-    def search(
-        self, query: Query, bodies: Sequence[MovingBody], time_s: float, extra_m: float, guess: GraphPath | None = None
-    ) -> GraphPath:
-        """The shortest graph path among obstacles, kept at some extra clearance."""
-        constraint, tool = self.settings.constraint, self.settings.tool
-        wider = replace(constraint, clearance_m=constraint.clearance_m + extra_m)
+    def search(self, query: Query, bodies: Sequence[MovingBody], time_s: float) -> GraphPath:
+        """The shortest graph path among obstacles; whether a curve along it keeps the clearance, too, is not known."""
+        self.sense(query, bodies, time_s)
+        return self.graph.shortest_path(query.start, query.goal)
+
+    def sense(self, query: Query, bodies: Sequence[MovingBody], time_s: float, closely: bool = False) -> None:
+        """Let the graph know where obstacles are."""
+        constraint = self.settings.constraint
         self._take_up(query)
-        felt = feel(bodies, query.points_m, tool, wider, query.longest_travel_m, time_s)
-        self.graph.feel(felt.nodes, felt.factor, felt.room_m)
-        return self.graph.shortest_path(query.start, query.goal, guess)
+        block_count = self.surface.position.shape[1]
+        felt = feel(bodies, query.balls, constraint, query.longest_travel_m, time_s, block_count)
+        finer = self.settings.shape.finer if closely else None
+        if finer is not None:
+            states = query.states.with_vectors(query.states.vectors[query.nodes[felt.nodes]])
+            felt = closer_look(felt, states, finer, bodies, constraint, query.longest_travel_m, time_s)
+        self.graph.feel(query.nodes[felt.nodes], felt.factor, felt.room_m)
+
+    def _near(
+        self, query: Query, found: GraphPath, curve: FittedCurve, is_close: Bool[np.ndarray, " step"]
+    ) -> Int[np.ndarray, " node"]:
+        """Nodes of a path, and around the curve fitted to it, where that comes too close; start and goal stay open."""
+        grid, steps = self.surface.grid, np.flatnonzero(is_close)
+        codes = curve.codes[np.unique([steps, steps + 1])]
+        of_path = cdist(codes, grid.nodes[found.nodes]).argmin(axis=1)
+        near = np.concatenate([grid.nearest(codes), found.nodes[of_path]])
+        return np.setdiff1d(near, [query.start, query.goal])
 
     def fit(self, query: Query, found: GraphPath) -> FittedCurve:
         """A smooth curve along a graph path."""
         return fit_curve(self.manifold, self.surface, query.offsets, query.ends, found, self.graph, self.settings)
 
-    def clearance(self, query: Query, curve: FittedCurve, bodies: Sequence[MovingBody], time_s: float) -> float:
-        """Distance between tool and obstacles that is guaranteed along a whole curve [m]."""
+    def clearances(
+        self, curve: FittedCurve, bodies: Sequence[MovingBody], time_s: float, closely: bool = False
+    ) -> Float[np.ndarray, " step"]:
+        """Distances between robot and obstacles that are kept along the steps of a curve [m]; empty without any."""
         if not bodies:
-            return np.inf
-        tool, poses = self.settings.tool, _in_small_steps(curve.path.poses, self.settings.tool)
-        horizon_s = self.settings.constraint.horizon_s
-        apart = distances(bodies, tool.points(poses), tool.radii_m, time_s, horizon_s).min(axis=0)
-        return float(((apart[:-1] + apart[1:] - _steps_m(poses, tool)) / 2).min(initial=apart[0]))
+            return np.zeros(0)
+        constraint, shape = self.settings.constraint, self.settings.shape
+        if closely and shape.finer is not None:
+            shape = shape.finer
+        return kept_clearances(curve.path.states, shape, bodies, time_s, constraint.horizon_s)
 
     # ------------------------------------------------------------ judging
     def _refuse(self, query: Query, bodies: Sequence[MovingBody], time_s: float) -> Plan | None:
-        tool, settings = self.settings.tool, self.settings
-        apart_m, apart_rad = self.support.distances(query.ends.position_m, query.ends.orientation)
+        settings = self.settings
+        shape = settings.shape.finer or settings.shape
+        apart_m, apart_rad = self.support.distances(query.ends)
         states = (
             (PlanStatus.start_outside, PlanStatus.start_covered),
             (PlanStatus.goal_outside, PlanStatus.goal_covered),
@@ -308,8 +256,8 @@ class Planner:
                     NO_CODES,
                 )
             if bodies and settings.constraint.hard:
-                points = tool.points(query.ends[end : end + 1] if end == 0 else query.ends[1:])
-                apart = distances(bodies, points, tool.radii_m, time_s, settings.constraint.horizon_s)[:, 0]
+                points = shape.points(query.ends[end : end + 1] if end == 0 else query.ends[1:])
+                apart = distances(bodies, points, shape.radii_m, time_s, settings.constraint.horizon_s)[:, 0]
                 names = tuple(
                     body.name for body, d in zip(bodies, apart, strict=True) if d < settings.constraint.clearance_m
                 )
@@ -318,7 +266,8 @@ class Planner:
                     return Plan(covered, reason, NO_CODES, blocking=names)
         return None
 
-    def _judged(self, query: Query, curve: FittedCurve, clearance: float) -> Plan:
+    def judged(self, query: Query, curve: FittedCurve, clearance: float) -> Plan:
+        """The plan that a curve is: found, or across a region without data."""
         scores = self._scores(query, curve, clearance)
         reason = PlanStatus.found.value
         status = PlanStatus.found
@@ -332,13 +281,11 @@ class Planner:
         return Plan(status, reason, curve.codes, curve.path, scores)
 
     def _scores(self, query: Query, curve: FittedCurve, clearance: float) -> PathScores:
-        poses = curve.path.poses
-        apart_m, apart_rad = self.support.distances(poses.position_m, poses.orientation)
+        apart_m, apart_rad = self.support.distances(curve.path.states)
         line = np.linspace(curve.codes[0], curve.codes[-1], len(curve.codes))
-        nodes = self.surface.decoded.poses
-        ends = [query.start, query.goal]
-        residual_m = np.linalg.norm(nodes.position_m[ends] - query.ends.position_m, axis=1)
-        residual_rad = np.diag(orientation_angles(nodes.orientation[ends], query.ends.orientation))
+        nodes = self.surface.decoded.states
+        found = nodes.with_vectors(nodes.vectors[[query.start, query.goal]])
+        residual_m, residual_rad = found.residuals(query.ends)
         return PathScores(
             curve.length,
             curve.graph_length,
@@ -356,24 +303,6 @@ def energy(manifold: SkillManifold, codes: Codes) -> float:
 
     Source: Thesis Eq. (3.14).
     """
-    embedded = np.concatenate(manifold.embed(codes), axis=1)
+    position, rest = manifold.embed(codes)
+    embedded = np.column_stack([position.reshape(len(codes), -1), rest])
     return float(np.linalg.norm(np.diff(embedded, axis=0), axis=1).sum() ** 2)
-
-
-def _steps_m(poses: PosePath, tool: Tool) -> Float[np.ndarray, " step"]:
-    numbers = np.arange(len(poses))
-    return travel_m(poses, np.stack([numbers[:-1], numbers[1:]], axis=1), tool)
-
-
-def _in_small_steps(poses: PosePath, tool: Tool) -> PosePath:
-    """The same path with poses between its own ones."""
-    longest = _steps_m(poses, tool).max(initial=0.0)
-    pieces = int(np.clip(np.ceil(longest / CHECKED_STEP_M), 1, MOST_STEPS))
-    return poses if pieces == 1 else poses.resampled((len(poses) - 1) * pieces + 1)
-
-
-def _joined(start: PosePath, goal: PosePath) -> PosePath:
-    return PosePath(
-        np.concatenate([start.position_m[:1], goal.position_m[-1:]]),
-        np.concatenate([start.orientation[:1], goal.orientation[-1:]]),
-    )

@@ -7,8 +7,9 @@ import numpy as np
 from geomotion.manifolds.graph import GraphPath
 from geomotion.obstacles.motion import MovingBody
 from geomotion.planning.curve import FittedCurve
-from geomotion.planning.planner import Planner, Query
-from geomotion.scores.paths import PosePath
+from geomotion.planning.ends import Query
+from geomotion.planning.planner import Planner
+from geomotion.scores.paths import MotionPath
 
 
 class Replanner:
@@ -20,13 +21,13 @@ class Replanner:
         goal: Where it ends.
     """
 
-    def __init__(self, planner: Planner, start: PosePath, goal: PosePath) -> None:
+    def __init__(self, planner: Planner, start: MotionPath, goal: MotionPath) -> None:
         self.planner, self.goal = planner, goal
         self.query: Query = planner.query(start, goal)
         self._last: GraphPath | None = None
 
     def replan(
-        self, bodies: Sequence[MovingBody], time_s: float, at: int | None = None, pose: PosePath | None = None
+        self, bodies: Sequence[MovingBody], time_s: float, at: int | None = None, state: MotionPath | None = None
     ) -> FittedCurve | None:
         """The path among obstacles as they are now; nothing where every way is blocked.
 
@@ -34,10 +35,10 @@ class Replanner:
             bodies: Obstacles.
             time_s: When they are looked at.
             at: Node to start from; the query's own if omitted.
-            pose: Where the robot is, near that node, so that the path begins there; the pose of the node if omitted.
+            state: The robot's, near that node, so that the path begins there; the state of the node if omitted.
         """
-        query = self.query if at is None else self.planner.onward(self.query, at, pose)
-        route = self.planner.route(query, bodies, time_s, self._rest_from(query.start))
+        query = self.query if at is None else self.planner.ends.onward(self.query, at, state)
+        route = self.planner.route(query, bodies, time_s, self._rest_from(query.start), closely=False)
         self._last = self._last if route is None else route.found
         return None if route is None else route.curve
 

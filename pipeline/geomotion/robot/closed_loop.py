@@ -10,14 +10,15 @@ from geomotion.robot import panda
 from geomotion.robot.film import Film
 from geomotion.robot.inverse_kinematics import UnreachablePose, solve_pose
 from geomotion.robot.recording import AT_REST, Motions, Recorder, Tracking
-from geomotion.robot.scene import PandaScene
+from geomotion.robot.scene import ArmScene
 from geomotion.robot.timed import RATE_HZ
 from geomotion.types import Float
 
 Position = Float[np.ndarray, "3"]
 Quaternion = Float[np.ndarray, "4"]
-Joints = Float[np.ndarray, "7"]
-Controller = Callable[[float, Position, Quaternion], tuple[Position, Quaternion]]
+Joints = Float[np.ndarray, " joint"]
+Target = tuple[Position, Quaternion] | Joints
+Controller = Callable[[float, Position, Quaternion], Target]
 
 
 @dataclass(frozen=True)
@@ -40,50 +41,52 @@ class ClosedLoop:
 
 
 def closed_loop(
-    scene: PandaScene,
+    scene: ArmScene,
     controller: Controller,
     start_rad: Joints,
     duration_s: float,
     control_hz: float = 60.0,
-    frame: panda.Frame = "grasp_target",
     motions: Motions = AT_REST,
     film: Film | None = None,
     has_ended: Callable[[], bool] = lambda: False,
 ) -> ClosedLoop:
-    """Let a controller lead a frame of the arm, within the joints' limits of velocity and acceleration.
+    """Let a controller lead the tip of the arm, or its joints, within the joints' limits of velocity and acceleration.
 
     Where the pose asked for is beyond the joints' range or too far for one period, the arm goes towards it.
 
     Args:
         scene: Its arm is put at the start.
-        controller: Time [s] and measured pose (m, wxyz) -> the pose to be at one period later.
+        controller: Time [s] and measured pose (m, wxyz) -> the pose, or the joint positions, of one period later.
         start_rad: [rad].
         duration_s: How long [s], at most.
         control_hz: How often the controller is asked [Hz]; divides 240.
-        frame: The frame that it leads.
         motions: Obstacle -> function of the time [s] that gives its offset from its place [m]; the others rest.
         film: Takes pictures, if given.
         has_ended: Asked after each period: whether it was the last one.
 
     Raises:
         InvalidSetting: If `control_hz` does not divide 240, the duration is shorter than a period, or the controller
-            returns what is no pose.
+            returns what is no pose, or a pose for an arm that is no Panda.
         UnknownName: If a moving obstacle is not in the scene.
     """
     steps = _steps_per_period(control_hz)
     if not duration_s * control_hz >= 1:
         raise InvalidSetting("robot.duration_s", duration_s, f"{1 / control_hz:.3g} s, one period, or more")
-    recorder, asked, unreachable = Recorder(scene, frame, motions, film), [], []
+    recorder, asked, unreachable = Recorder(scene, motions, film), [], []
     scene.set_joints(start_rad)
     joints, velocity, last_target = start_rad, np.zeros_like(start_rad), start_rad
     for period in range(round(duration_s * control_hz)):
         time_s = period / control_hz
         recorder.prepare(time_s)
-        asked.append((time_s, *controller(time_s, *scene.end_effector_pose(frame))))
-        solution = solve_pose(*asked[-1][1:], last_target, frame)
-        unreachable += [replace(pose, index=period) for pose in solution.unreachable]
-        target = solution.joints_rad[0]
-        velocity = approach_velocity(joints, velocity, last_target, target, 1 / control_hz)
+        wanted = controller(time_s, *scene.end_effector_pose())
+        if isinstance(wanted, tuple):
+            solution = solve_pose(*wanted, last_target, panda.frame_of(scene.arm.tip_link))
+            unreachable += [replace(pose, index=period) for pose in solution.unreachable]
+            target = solution.joints_rad[0]
+        else:
+            target, wanted = wanted, scene.arm.chain.pose(wanted)
+        asked.append((time_s, *wanted))
+        velocity = approach_velocity(joints, velocity, last_target, target, 1 / control_hz, scene.arm.limits)
         last_target = target
         for step in range(1, steps + 1):
             recorder.prepare(time_s + step / RATE_HZ)
@@ -98,14 +101,18 @@ def closed_loop(
 
 
 def approach_velocity(
-    joints_rad: Joints, velocity_rad_per_s: Joints, last_target_rad: Joints, target_rad: Joints, period_s: float
+    joints_rad: Joints,
+    velocity_rad_per_s: Joints,
+    last_target_rad: Joints,
+    target_rad: Joints,
+    period_s: float,
+    limits: panda.JointLimits,
 ) -> Joints:
     """The velocity for one period that leads to where a target will be at its end [rad/s], each joint for itself.
 
     It differs from the last by no more than acceleration allows. A target at rest is not overshot, because room to
     brake is left; one in motion is expected to go on.
     """
-    limits = panda.LIMITS
     target_velocity = np.clip(
         (target_rad - last_target_rad) / period_s, -limits.velocity_rad_per_s, limits.velocity_rad_per_s
     )

@@ -12,7 +12,7 @@ from jaxtyping import UInt8
 
 from geomotion.errors import InvalidSetting
 from geomotion.files import atomic
-from geomotion.robot.scene import PandaScene
+from geomotion.robot.scene import ArmScene
 from geomotion.types import Float
 
 Frame = UInt8[np.ndarray, "height width 3"]
@@ -21,11 +21,15 @@ PATH_COLOUR = (0.0, 0.45, 0.70, 1.0)  # blue, as geodesics are in all figures
 DOT_RADIUS_M = 0.005
 LONGEST_PATH = 200  # dots
 COLOURS = 64
+FROM_THE_SIDE, FROM_ABOVE = (1.25, -1.0, 0.55), (0.4, -0.6, 1.0)
+ROOM = 1.15  # of the picture, around the ball that holds what is seen
+LEVEL = 0.2  # height, in radii of that ball, below which a motion is level
+SMALLEST_VIEW_M = 0.05
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Where the scene is seen from; the default shows arm, table and the space in front.
+    """Where the scene is seen from; the default shows the Panda, a table and the space in front.
 
     Attributes:
         eye_m: [m].
@@ -41,7 +45,19 @@ class Camera:
     width: int = 320
     height: int = 240
 
-    def picture(self, scene: PandaScene) -> Frame:
+    @classmethod
+    def around(cls, moved_m: Float[np.ndarray, "point 3"], resting_m: Float[np.ndarray, "other 3"]) -> "Camera":
+        """One that sees all of some points [m]; from above, where those that move lie in a level plane."""
+        seen_m = np.concatenate([moved_m, resting_m])
+        low, high = seen_m.min(axis=0), seen_m.max(axis=0)
+        radius_m = max(float(np.linalg.norm(high - low)) / 2, SMALLEST_VIEW_M)
+        is_level = np.ptp(moved_m[:, 2]) < LEVEL * radius_m
+        direction = np.array(FROM_ABOVE if is_level else FROM_THE_SIDE)
+        middle = (low + high) / 2
+        eye = middle + ROOM * radius_m / np.tan(np.radians(cls.view_deg / 2)) * direction / np.linalg.norm(direction)
+        return cls(tuple(eye.tolist()), tuple(middle.tolist()))
+
+    def picture(self, scene: ArmScene) -> Frame:
         """The scene as it is now."""
         client = scene.client
         view = client.computeViewMatrix(self.eye_m, self.target_m, [0, 0, 1])
@@ -74,7 +90,7 @@ class Film:
     camera: Camera = field(default_factory=Camera)
     frames: list[Frame] = field(default_factory=list)
 
-    def watch(self, scene: PandaScene, time_s: float) -> None:
+    def watch(self, scene: ArmScene, time_s: float) -> None:
         """Take the next frame if it is due [s]."""
         if time_s * self.fps / self.speed >= len(self.frames) - 1e-9:
             self.frames.append(self.camera.picture(scene))
@@ -84,7 +100,7 @@ class Film:
         save_gif(self.frames, path, self.fps)
 
 
-def draw_path(scene: PandaScene, positions_m: Float[np.ndarray, "pose 3"]) -> None:
+def draw_path(scene: ArmScene, positions_m: Float[np.ndarray, "pose 3"]) -> None:
     """Show a path as dots, which nothing collides with, in pictures taken from now on."""
     scene.draw(_thinned(positions_m), DOT_RADIUS_M, PATH_COLOUR)
 

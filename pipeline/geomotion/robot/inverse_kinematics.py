@@ -69,6 +69,12 @@ class JointPath:
         return float(np.abs(np.diff(self.joints_rad, axis=0)).max(initial=0.0))
 
 
+def exactly(joints_rad: Float[np.ndarray, "pose joint"], limits: panda.JointLimits) -> JointPath:
+    """Joint positions that are asked for themselves, so that nothing is left."""
+    nothing = np.zeros(len(joints_rad))
+    return JointPath(joints_rad, nothing, nothing, limits.margin_rad(joints_rad), np.ones(len(joints_rad), bool))
+
+
 def solve_path(
     positions_m: Float[np.ndarray, "pose 3"],
     orientations_wxyz: Float[np.ndarray, "pose 4"],
@@ -89,8 +95,7 @@ def solve_path(
         ShapeMismatch: If there are no poses, or not one orientation per position.
         InvalidSetting: If a number is not finite or a quaternion is not of unit length.
     """
-    _check(positions_m, orientations_wxyz)
-    targets = _transforms(positions_m, orientations_wxyz)
+    targets = pose_transforms(positions_m, orientations_wxyz)
     chain = panda_chain(frame)
     best = _follow(chain, targets, search(chain, targets[0], panda.HOME_RAD))
     if not _is_good(best):
@@ -118,21 +123,21 @@ def solve_pose(
     Raises:
         InvalidSetting: If a number is not finite or the quaternion is not of unit length.
     """
-    _check(position_m[None], orientation_wxyz[None])
-    targets, chain = _transforms(position_m[None], orientation_wxyz[None]), panda_chain(frame)
-    return _judge(chain, targets, search(chain, targets[0], start_rad)[None])
+    targets, chain = pose_transforms(position_m[None], orientation_wxyz[None]), panda_chain(frame)
+    return judge(chain, targets, search(chain, targets[0], start_rad)[None])
 
 
 def _follow(chain: Chain, targets: Float[np.ndarray, "pose 4 4"], first: Float[np.ndarray, " joint"]) -> JointPath:
     joints = [first]
     for target in targets[1:]:
         joints.append(search(chain, target, joints[-1]))
-    return _judge(chain, targets, np.stack(joints))
+    return judge(chain, targets, np.stack(joints))
 
 
-def _judge(
+def judge(
     chain: Chain, targets: Float[np.ndarray, "pose 4 4"], joints_rad: Float[np.ndarray, "pose joint"]
 ) -> JointPath:
+    """Joint positions for poses, with what is left to each of them."""
     positions, quaternions = chain.pose(joints_rad)
     position_error = np.linalg.norm(targets[:, :3, 3] - positions, axis=1)
     turns = Rotation.from_matrix(targets[:, :3, :3]) * Rotation.from_quat(quaternions, scalar_first=True).inv()
@@ -156,16 +161,23 @@ def _other_branches(
     found = [known]
     for start in np.random.default_rng(SEED).uniform(lower, upper, size=(RANDOM_STARTS, len(lower))):
         q = search(chain, target, start)
-        if _judge(chain, target[None], q[None]).reached[0] and all(
+        if judge(chain, target[None], q[None]).reached[0] and all(
             np.abs(q - other).max() > SAME_BRANCH_RAD for other in found
         ):
             found.append(q)
             yield q
 
 
-def _transforms(
+def pose_transforms(
     positions_m: Float[np.ndarray, "pose 3"], orientations_wxyz: Float[np.ndarray, "pose 4"]
 ) -> Float[np.ndarray, "pose 4 4"]:
+    """Poses as homogeneous transforms [m].
+
+    Raises:
+        ShapeMismatch: If there are no poses, or not one orientation per position.
+        InvalidSetting: If a number is not finite or a quaternion is not of unit length.
+    """
+    _check(positions_m, orientations_wxyz)
     transforms = np.tile(np.eye(4), (len(positions_m), 1, 1))
     transforms[:, :3, :3] = Rotation.from_quat(orientations_wxyz, scalar_first=True).as_matrix()
     transforms[:, :3, 3] = positions_m

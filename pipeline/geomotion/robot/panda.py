@@ -12,22 +12,15 @@ from typing import Literal
 import numpy as np
 
 from geomotion.errors import InvalidSetting
+from geomotion.robot.gripper import Gripper
 from geomotion.types import Float
 
 Frame = Literal["grasp_target", "flange"]
 FRAME_LINKS: dict[Frame, str] = {"grasp_target": "panda_grasptarget", "flange": "panda_link8"}
 JOINTS = tuple(f"panda_joint{number}" for number in range(1, 8))
-FINGER_JOINTS = ("panda_finger_joint1", "panda_finger_joint2")
 BASE_LINK = "panda_link0"
-SOLID_LINKS = (  # those with a surface, apart from the base, which does not move
-    *(f"panda_link{number}" for number in range(1, 8)),
-    "panda_hand",
-    "panda_leftfinger",
-    "panda_rightfinger",
-)
-EFFORT_NM = np.array([87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0])
+GRIPPER = Gripper("panda_grasptarget", ("panda_finger_joint1", "panda_finger_joint2"))
 HOME_RAD = np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4])
-FINGERS_OPEN_M = 0.04  # each
 
 # of the collision shapes of hand and fingers, in the grasp-target frame: y [m], z [m], radius [m]; x is zero
 HAND_BALLS = (
@@ -94,6 +87,19 @@ def urdf_path() -> Path:
     import pybullet_data
 
     return Path(pybullet_data.getDataPath()) / "franka_panda/panda.urdf"
+
+
+def frame_of(tip_link: str) -> Frame:
+    """The frame that an arm's tip is.
+
+    Raises:
+        InvalidSetting: If that is none of the Panda's, whose inverse kinematics are all there are.
+    """
+    for frame, link in FRAME_LINKS.items():
+        if link == tip_link:
+            return frame
+    expected = f"{' or '.join(FRAME_LINKS.values())}, of the Panda: other arms take configurations, not poses"
+    raise InvalidSetting("arm.tip_link", tip_link, expected)
 
 
 def hand_balls(frame: Frame) -> tuple[Float[np.ndarray, "ball 3"], Float[np.ndarray, " ball"]]:

@@ -31,7 +31,7 @@ def search(
     before = np.inf
     for _ in range(ITERATIONS):
         reached, J = chain.pose_and_jacobian(q)
-        error = _error(reached, target)
+        error = pose_error(reached, target)
         square = float(error @ error)
         if square < CONVERGED_M**2 or abs(before - square) < STALLED * square:
             break
@@ -59,7 +59,7 @@ def _step(
     return kept
 
 
-def _error(reached: Float[np.ndarray, "4 4"], target: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "6"]:
+def pose_error(reached: Float[np.ndarray, "4 4"], target: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "6"]:
     """What is left to the target: position [m] and rotation vector times the lever [m], in the base frame."""
     turn = Rotation.from_matrix(target[:3, :3] @ reached[:3, :3].T).as_rotvec()
     return np.concatenate([target[:3, 3] - reached[:3, 3], LEVER_M * turn])

@@ -1,7 +1,7 @@
-"""The Panda at its table in PyBullet, with obstacles and a grasped object: poses, distances, contacts.
+"""An arm in PyBullet, with obstacles and a grasped object: poses, distances, contacts.
 
-The arm's base is the world frame; the table's top is at z = 0, the floor 0.63 m below. Quaternions are scalar-first
-here and scalar-last only in calls of PyBullet. Nothing is printed.
+The arm's base is the world frame; the table's top is at z = 0, the floor 0.63 m below, and only seen. Quaternions are
+scalar-first here and scalar-last only in calls of PyBullet. Nothing is printed.
 """
 
 from types import TracebackType
@@ -10,50 +10,57 @@ from typing import Any
 import numpy as np
 
 from geomotion.errors import InvalidSetting, UnknownName
-from geomotion.robot import panda
+from geomotion.robot.arm import Arm
 from geomotion.robot.grasp import Grasp, GraspedCylinder
+from geomotion.robot.gripper import Gripper
 from geomotion.robot.placed import PlacedObstacle
 from geomotion.robot.quiet import quiet
+from geomotion.robot.self_collision import Pair, SelfCollision
 from geomotion.robot.shapes import Shape, dots, shape_of
+from geomotion.robot.simulated_arm import Joints, SimulatedArm
 from geomotion.types import Float
 
 Vector = Float[np.ndarray, "3"]
 Quaternion = Float[np.ndarray, "4"]
-Joints = Float[np.ndarray, "7"]
 
 STEP_S = 1 / 240  # PyBullet's own time step, to which its solver is tuned
 FLOOR_M = -0.63
 TABLE_SIZE_M, TABLE_CENTRE_M = np.array([1.3, 1.8, 0.05]), np.array([0.35, 0.0, -0.025])
 GRAVITY_M_PER_S2 = 9.81
-POSITION_GAIN, VELOCITY_GAIN = 0.3, 1.0
-FINGER_FORCE_N = 20.0
 PROBE_RADIUS_M = 1e-4
 FAR_M = 5.0
 GRASPED, TABLE = "grasped", "table"
-HOLDING_LINK = "panda_grasptarget"
 TABLE_COLOUR = (0.80, 0.74, 0.66, 1.0)
 NOWHERE = np.zeros(3)
 
 
-class PandaScene:
-    """A Panda in a simulator of its own; a context manager.
+class ArmScene:
+    """An arm in a simulator of its own, its joints at zero or the limit nearest to it; a context manager.
 
     Args:
+        arm: Any serial arm.
+        gripper: With what it can hold an object, if it can.
         table: Whether a table stands under the arm.
+
+    Raises:
+        InvalidSetting: If the simulator cannot load the arm's URDF, or one of its meshes.
     """
 
-    def __init__(self, *, table: bool = True) -> None:
+    def __init__(self, arm: Arm, gripper: Gripper | None = None, *, table: bool = False) -> None:
+        self.arm, self.gripper = arm, gripper
         with quiet():  # importing PyBullet prints already
             import pybullet
             from pybullet_utils.bullet_client import BulletClient
 
             self.client: Any = BulletClient(pybullet.DIRECT)
-            self._load(table)
+            self._furnish(table)
+            self.simulated = SimulatedArm(self.client, arm)
         self.obstacles: dict[str, PlacedObstacle] = {}
         self._grasped: Grasp | None = None
-        self.set_joints(panda.HOME_RAD)
+        self._self_collision = SelfCollision(self.simulated)
+        self.set_joints(np.clip(0.0, arm.limits.lower_rad, arm.limits.upper_rad))
 
-    def __enter__(self) -> "PandaScene":
+    def __enter__(self) -> "ArmScene":
         return self
 
     def __exit__(
@@ -63,21 +70,17 @@ class PandaScene:
 
     def set_joints(self, joints_rad: Joints) -> None:
         """Put the arm there at rest, fingers and grasped object with it, without simulating the way [rad]."""
-        for name, position in zip(panda.JOINTS, joints_rad, strict=True):
-            self.client.resetJointState(self.arm, self.joint_index[name], float(position))
-        for name in panda.FINGER_JOINTS:
-            self.client.resetJointState(self.arm, self.joint_index[name], self._finger_m)
-        if self._grasped is not None:
-            self._grasped.place(self._link_pose(HOLDING_LINK))
+        self.simulated.set_joints(joints_rad)
+        if self.gripper is not None and self._grasped is not None:
+            self._grasped.place(self.simulated.link_pose(self.gripper.holding_link))
 
     def joints(self) -> tuple[Joints, Joints]:
         """Measured positions [rad] and velocities [rad/s]."""
-        states = self.client.getJointStates(self.arm, [self.joint_index[name] for name in panda.JOINTS])
-        return np.array([state[0] for state in states]), np.array([state[1] for state in states])
+        return self.simulated.joints()
 
-    def end_effector_pose(self, frame: panda.Frame = "grasp_target") -> tuple[Vector, Quaternion]:
-        """Measured position [m] and orientation (wxyz) of a frame of the arm."""
-        position, xyzw = self._link_pose(panda.FRAME_LINKS[frame])
+    def end_effector_pose(self) -> tuple[Vector, Quaternion]:
+        """Measured position [m] and orientation (wxyz) of the arm's tip."""
+        position, xyzw = self.simulated.link_pose(self.arm.tip_link)
         return np.array(position), np.roll(xyzw, 1)
 
     def command(self, joints_rad: Joints, velocity_rad_per_s: Joints) -> None:
@@ -85,16 +88,7 @@ class PandaScene:
 
         The motors act on the position before a step: told that of its end, they would run a step ahead.
         """
-        self.client.setJointMotorControlArray(
-            self.arm,
-            [self.joint_index[name] for name in panda.JOINTS],
-            self.client.POSITION_CONTROL,
-            targetPositions=joints_rad.tolist(),
-            targetVelocities=velocity_rad_per_s.tolist(),
-            positionGains=[POSITION_GAIN] * len(panda.JOINTS),
-            velocityGains=[VELOCITY_GAIN] * len(panda.JOINTS),
-            forces=panda.EFFORT_NM.tolist(),
-        )
+        self.simulated.command(joints_rad, velocity_rad_per_s)
 
     def step(self) -> None:
         """Simulate 1/240 s."""
@@ -130,14 +124,18 @@ class PandaScene:
         """Let the hand hold a cylinder from now on.
 
         Raises:
-            InvalidSetting: If it holds one already.
+            InvalidSetting: If it holds one already, or nothing is known of a hand.
         """
+        if self.gripper is None:
+            expected = f"0: nothing is known of a hand of arm {self.arm.name!r} that could hold an object"
+            raise InvalidSetting("planning.tool_radius_m", tool.radius_m, expected)
         if self._grasped is not None:
             raise InvalidSetting("robot.grasped", tool, "one object at a time")
+        simulated = self.simulated
         with quiet():
-            self._grasped = Grasp(self.client, self.arm, self.link_index[HOLDING_LINK], tool)
-        self._finger_m = min(tool.radius_m, panda.FINGERS_OPEN_M)
-        self._hold_fingers()
+            link = simulated.link_index[self.gripper.holding_link]
+            self._grasped = Grasp(self.client, simulated.body, link, tool)
+        simulated.rest({name: min(tool.radius_m, self.arm.resting[name]) for name in self.gripper.finger_joints})
         self.set_joints(self.joints()[0])
 
     def draw(self, points_m: Float[np.ndarray, "point 3"], radius_m: float, colour: tuple[float, ...]) -> None:
@@ -165,6 +163,18 @@ class PandaScene:
         """
         return self._distances(self._obstacle(obstacle), max_distance_m)
 
+    def self_clearances(self, up_to_m: float = 0.2) -> dict[Pair, float]:
+        """Distances between links of the arm that can collide [m], without those farther apart than `up_to_m`.
+
+        Which pairs these are is said in :class:`geomotion.robot.self_collision.SelfCollision`; a grasped object
+        counts as part of the hand.
+        """
+        found = self._self_collision.distances(up_to_m)
+        if self._grasped is not None:
+            held = self._self_collision.distances_of_held(self._grasped.body, up_to_m)
+            found |= {(link, GRASPED): apart_m for link, apart_m in held.items()}
+        return found
+
     def touching(self) -> dict[str, tuple[str, ...]]:
         """For every obstacle, and the table, that is touched: the links, or the grasped object, that touch it."""
         solids = self.obstacles if self.table is None else self.obstacles | {TABLE: self.table}
@@ -188,11 +198,13 @@ class PandaScene:
     @property
     def body_names(self) -> tuple[str, ...]:
         """The links with a surface that move, and the grasped object if there is one."""
-        return panda.SOLID_LINKS if self._grasped is None else (*panda.SOLID_LINKS, GRASPED)
+        links = self.simulated.solid_links
+        return links if self._grasped is None else (*links, GRASPED)
 
     def _distances(self, placed: PlacedObstacle, up_to_m: float) -> dict[str, float]:
-        found = placed.distances(self.arm, up_to_m)
-        named = {name: found[self.link_index[name]] for name in panda.SOLID_LINKS if self.link_index[name] in found}
+        simulated = self.simulated
+        found = placed.distances(simulated.body, up_to_m)
+        named = {name: found[at] for name in simulated.solid_links if (at := simulated.link_index[name]) in found}
         if self._grasped is not None:
             for distance in placed.distances(self._grasped.body, up_to_m).values():
                 named[GRASPED] = distance
@@ -203,33 +215,17 @@ class PandaScene:
             raise UnknownName("obstacle", name, self.obstacles)
         return self.obstacles[name]
 
-    def _link_pose(self, link: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        state = self.client.getLinkState(self.arm, self.link_index[link], computeForwardKinematics=1)
-        return state[4], state[5]
+    def _furnish(self, table: bool) -> None:
+        """Everything but the arm."""
+        import pybullet_data
 
-    def _load(self, table: bool) -> None:
         client = self.client
         client.setTimeStep(STEP_S)
         client.setGravity(0, 0, -GRAVITY_M_PER_S2)
-        self.arm: int = client.loadURDF(str(panda.urdf_path()), useFixedBase=True)
-        infos = [client.getJointInfo(self.arm, index) for index in range(client.getNumJoints(self.arm))]
-        self.joint_index = {info[1].decode(): info[0] for info in infos}
-        self.link_index = {info[12].decode(): info[0] for info in infos}
-        self._finger_m = panda.FINGERS_OPEN_M
-        self._hold_fingers()
-        client.loadURDF(str(panda.urdf_path().parents[1] / "plane.urdf"), [0, 0, FLOOR_M])
+        floor = client.loadURDF(f"{pybullet_data.getDataPath()}/plane.urdf", [0, 0, FLOOR_M])
+        client.setCollisionFilterGroupMask(floor, -1, 0, 0)  # no arm's own floor is known
         box = {"shapeType": client.GEOM_BOX, "halfExtents": (TABLE_SIZE_M / 2).tolist()}
         self.table = PlacedObstacle(client, Shape([box], box, TABLE_CENTRE_M), TABLE_COLOUR) if table else None
         ball = client.createCollisionShape(client.GEOM_SPHERE, radius=PROBE_RADIUS_M)
         self._probe: int = client.createMultiBody(0, ball, basePosition=[0, 0, 2 * FAR_M])
         client.setCollisionFilterGroupMask(self._probe, -1, 0, 0)
-
-    def _hold_fingers(self) -> None:
-        for name in panda.FINGER_JOINTS:
-            self.client.setJointMotorControl2(
-                self.arm,
-                self.joint_index[name],
-                self.client.POSITION_CONTROL,
-                targetPosition=self._finger_m,
-                force=FINGER_FORCE_N,
-            )

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from geomotion.errors import InvalidSetting, ShapeMismatch
-from geomotion.robot.panda import LIMITS, JointLimits
+from geomotion.robot.panda import JointLimits
 from geomotion.robot.timed import DEGREE, TimedJoints, TimedPath, smooth_law
 from geomotion.types import Float
 
@@ -27,7 +27,7 @@ def like_demonstration(
     joints_rad: PathJoints,
     share_of_path_at_time: Float[np.ndarray, " sample"],
     duration_s: float,
-    limits: JointLimits = LIMITS,
+    limits: JointLimits,
 ) -> TimedJoints:
     """Follow a path with the timing of a demonstration, slower where a limit is in the way, at rest at both ends.
 
@@ -52,7 +52,7 @@ def like_demonstration(
     return motion.sampled(stretch * duration_s, stretch)
 
 
-def fastest(joints_rad: PathJoints, limits: JointLimits = LIMITS, share_of_limits: float = 1.0) -> TimedJoints:
+def fastest(joints_rad: PathJoints, limits: JointLimits, share_of_limits: float = 1.0) -> TimedJoints:
     """Follow a path about as fast as the limits of velocity, acceleration and jerk allow, at rest at both ends.
 
     Args:

@@ -5,6 +5,7 @@ Orientations are unit quaternions, scalar first, of either sign, or unit vectors
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -17,12 +18,61 @@ from geomotion.scores.curves import dtwd_per_point
 Positions = Float[np.ndarray, "pose Dx"]
 Orientations = Float[np.ndarray, "pose Dq"]
 QUATERNION, DIRECTION = 4, 3  # numbers of coordinates
+LEVER_M = 0.1  # a radian of turning counts as that much in the length of a step
 UNIT_TOLERANCE = 1e-3
+P = TypeVar("P", bound="MotionPath")  # the kind of path it is
+
+
+@runtime_checkable
+class MotionPath(Protocol):
+    """States of a robot in the order in which they are passed, at equal shares of the duration.
+
+    As vectors they can be added up and interpolated, whatever they are: poses, or configurations of an arm.
+    """
+
+    @property
+    def position_m(self) -> Positions:
+        """Of the end effector [m]."""
+        ...
+
+    @property
+    def orientation(self) -> Orientations:
+        """Of the end effector: unit quaternions wxyz, or unit vectors in space."""
+        ...
+
+    @property
+    def vectors(self) -> Float[np.ndarray, "state D"]:
+        """One row for each state."""
+        ...
+
+    def with_vectors(self: P, values: Float[np.ndarray, "other_state D"]) -> P:
+        """States of the same kind from their vectors, brought back to where such vectors have to lie."""
+        ...
+
+    def with_signs_of(self: P, known: P) -> P:
+        """The same states, written such that their vectors are near those of known ones, row by row."""
+        ...
+
+    def resampled(self: P, count: int) -> P:
+        """Interpolated at equal shares of the duration."""
+        ...
+
+    def residuals(self: P, other: P) -> tuple[Float[np.ndarray, " state"], Float[np.ndarray, " state"]]:
+        """How far apart the end effector's positions [m] and the angles of the states [rad] are, row by row."""
+        ...
+
+    def steps_m(self) -> Float[np.ndarray, " step"]:
+        """Lengths of the steps between states [m], angles counted by a lever."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self: P, part: slice) -> P: ...
 
 
 @dataclass(frozen=True)
 class PosePath:
-    """Poses in the order in which they are passed, at equal shares of the duration.
+    """Poses in the order in which they are passed, at equal shares of the duration; a :class:`MotionPath`.
 
     Attributes:
         position_m: In the robot's frame [m].
@@ -54,6 +104,37 @@ class PosePath:
         """Part of the path; ``path[:1]`` is its first pose."""
         return PosePath(self.position_m[part], self.orientation[part])
 
+    @property
+    def vectors(self) -> Float[np.ndarray, "pose D"]:
+        """Positions and orientations side by side.
+
+        An offset of zero changes nothing, and quaternions and directions need no separate rules.
+        """
+        return np.concatenate([self.position_m, self.orientation], axis=1)
+
+    def with_vectors(self, values: Float[np.ndarray, "other_pose D"]) -> "PosePath":
+        """Poses from positions and orientations side by side; the latter are brought to length one."""
+        dim = self.position_m.shape[1]
+        return PosePath(values[:, :dim], _unit(values[:, dim:]))
+
+    def with_signs_of(self, known: "PosePath") -> "PosePath":
+        """±q are one orientation: take the signs that known poses have."""
+        if self.orientation.shape[1] != QUATERNION:
+            return self
+        signs = np.where((known.orientation * self.orientation).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+        return PosePath(self.position_m, signs * self.orientation)
+
+    def residuals(self, other: "PosePath") -> tuple[Float[np.ndarray, " pose"], Float[np.ndarray, " pose"]]:
+        """Distances of positions [m] and angles between orientations [rad], pose by pose."""
+        apart_m = np.linalg.norm(self.position_m - other.position_m, axis=1)
+        chords = np.linalg.norm(self.with_signs_of(other).orientation - other.orientation, axis=1)
+        return apart_m, _angles(chords, self.orientation.shape[1])
+
+    def steps_m(self) -> Float[np.ndarray, " step"]:
+        """Lengths of the steps between poses with quaternions [m], a radian counting as `LEVER_M`."""
+        turned_rad = 2 * np.linalg.norm(np.diff(self.orientation, axis=0), axis=1)
+        return np.asarray(np.hypot(np.linalg.norm(np.diff(self.position_m, axis=0), axis=1), LEVER_M * turned_rad))
+
     def resampled(self, count: int) -> "PosePath":
         """Interpolated at equal shares of the duration; quaternions are of one sign along the path."""
         shares, wanted = np.linspace(0, 1, len(self)), np.linspace(0, 1, count)
@@ -84,11 +165,16 @@ def orientation_angles(
     chords = cdist(orientation, other)
     if orientation.shape[1] == QUATERNION:
         chords = np.minimum(chords, cdist(orientation, -other))
+    return _angles(chords, orientation.shape[1])
+
+
+def _angles(chords: Float[np.ndarray, "*batch"], dim: int) -> Float[np.ndarray, "*batch"]:
+    """Angles [rad] from distances between orientations of one sign."""
     angles = 2 * np.arcsin(np.minimum(chords / 2, 1))
-    return np.asarray(2 * angles if orientation.shape[1] == QUATERNION else angles)
+    return np.asarray(2 * angles if dim == QUATERNION else angles)
 
 
-def pose_dtwd(path: PosePath, other: PosePath) -> PoseDistance:
+def pose_dtwd(path: MotionPath, other: MotionPath) -> PoseDistance:
     """DTWD per point, as in :func:`geomotion.scores.curves.dtwd_per_point`, of positions and of orientations apart.
 
     Source:

@@ -16,6 +16,7 @@ TITLES = {
     "goal": "Starts on a grid",
     "pairs": "From every group's start to every group's goal",
     "methods": "The same geodesic by other methods",
+    "arm_failures": "Joint solutions of decoded poses that touch the obstacle, Fig. 4.4",
 }
 
 

@@ -4,27 +4,30 @@ import hashlib
 from collections.abc import Mapping
 from typing import Any
 
-from geomotion.config import DatasetConfig, GmsConfig
+from geomotion.config import DatasetConfig, GmsConfig, NoObstacle, ObstacleConfig, Space
 from geomotion.files import read_json
 from geomotion.manifolds.grid import require_memory
 from geomotion.stages import compare, scene, shared
 from geomotion.stages.evaluate_geodesics import EvaluateGeodesicsConfig, evaluate_geodesics, scores_table
-from geomotion.stages.graph import GraphStageConfig, graph, graph_table, memory_limit_bytes
+from geomotion.stages.graph import LATENT_SCENE, GraphStageConfig, graph, graph_table, memory_limit_bytes
 from geomotion.stages.ingest import ingest
 from geomotion.stages.plan import PlanStageConfig, plan, plan_table
 from geomotion.stages.replay import ReplayStageConfig, replay, replay_table
 from geomotion.stages.report_gms import ReportConfig, report_gms
 from geomotion.stages.session import Program, Session, Step, VerbResult
+from geomotion.stages.states import JOINTS
 from geomotion.stages.train_manifold import TrainManifoldConfig, train_manifold
-from geomotion.tracking import Stage
+from geomotion.tracking import Artefacts, Stage
 
 
 def _train_config(session: Session) -> TrainManifoldConfig:
     config: GmsConfig = session.config
     dataset = config.dataset
     # the base class: where recordings come from must not decide whether a training is repeated
-    selection = DatasetConfig(dataset.name, dataset.state_channels, dataset.train_demos, dataset.test_demos)
-    return TrainManifoldConfig(selection, config.manifold, config.training, config.seed)
+    selection = DatasetConfig(
+        dataset.name, dataset.state_channels, dataset.train_demos, dataset.test_demos, dataset.held_out
+    )
+    return TrainManifoldConfig(selection, config.manifold, config.training, config.seed, config.space, config.arm)
 
 
 def _graph_config(session: Session) -> GraphStageConfig:
@@ -32,20 +35,30 @@ def _graph_config(session: Session) -> GraphStageConfig:
 
 
 def _require_graph_fits(config: GmsConfig) -> None:
-    require_memory(config.graph.points_per_axis, config.manifold.latent_dim, memory_limit_bytes(config.graph))
+    """Before anything is trained, where the configuration says how large the grid is."""
+    if config.graph.points_per_axis is not None and config.manifold.latent_dim is not None:
+        require_memory(config.graph.points_per_axis, config.manifold.latent_dim, memory_limit_bytes(config.graph))
 
 
 def _plan_config(session: Session) -> PlanStageConfig:
     config: GmsConfig = session.config
-    # what is in files decides whether a plan is repeated, as everything in the configuration does
-    found = [path for path in scene.files(config.obstacle) if path.is_file()]
-    digests = {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in found}
+    digests = _file_digests(config.obstacle)
     return PlanStageConfig(config.planning, config.metric, config.obstacle, config.robot.frame, digests)
+
+
+def _file_digests(obstacle: ObstacleConfig) -> dict[str, str]:
+    """What is in files decides whether a stage is repeated, as everything in the configuration does."""
+    found = [path for path in scene.files(obstacle) if path.is_file()]
+    return {str(path): hashlib.sha256(path.read_bytes()).hexdigest() for path in found}
 
 
 def _evaluate_config(session: Session) -> EvaluateGeodesicsConfig:
     config: GmsConfig = session.config
-    return EvaluateGeodesicsConfig(config.evaluation, config.planning, config.metric, config.robot.frame)
+    # an obstacle that plays no part must not cause a repetition
+    obstacle = config.obstacle if config.evaluation.arm_failures.study else NoObstacle()
+    return EvaluateGeodesicsConfig(
+        config.evaluation, config.planning, config.metric, config.robot.frame, obstacle, _file_digests(obstacle)
+    )
 
 
 def _replay_config(session: Session) -> ReplayStageConfig:
@@ -86,17 +99,23 @@ def _train(session: Session) -> VerbResult:
 def _graph(session: Session) -> VerbResult:
     found = session.produce("graph")
     document = read_json(found.path("graph.json"))
-    text = f"{graph_table(document)}\n\npicture  {found.path('figures')}"
+    text = f"{graph_table(document)}\n\npicture  {found.path('figures/latent.png')}{_in_latent_space(found)}"
     return VerbResult(text, session.document(graph=document))
 
 
 def _plan(session: Session) -> VerbResult:
     found = session.produce("plan")
     document = read_json(found.path("plan.json"))
-    places = f"picture  {found.path('figures/plan.png')}\nin 3-D   {found.path('scene.html')}"
+    places = f"picture  {found.path('figures/plan.png')}\nin 3-D   {found.path('scene.html')}{_in_latent_space(found)}"
     path = f"\npath     {found.path('path.npz')}" if document["found"] else ""
     text = f"{plan_table(document)}\n\n{places}{path}"
     return VerbResult(text, session.document(plan=document), exit_code=0 if document["found"] else NO_PATH)
+
+
+def _in_latent_space(found: Artefacts) -> str:
+    """Where the interactive picture of a latent space of three dimensions is."""
+    path = found.folder / LATENT_SCENE
+    return f"\nlatent   {path}" if path.exists() else ""
 
 
 def _evaluate(session: Session) -> VerbResult:
@@ -120,8 +139,9 @@ def _is_executed(replay: Mapping[str, Any]) -> bool:
 
 
 def _report(session: Session) -> VerbResult:
-    summary = read_json(session.produce("ingest").path("summary.json"))
-    name = "report" if summary["space"].startswith("R3xS3") else "report without robot"
+    space = read_json(session.produce("ingest").path("summary.json"))["space"]
+    is_of_joints = space == JOINTS or session.config.space is Space.joint
+    name = "report" if is_of_joints or space.startswith("R3xS3") else "report without robot"
     path = str(session.produce(name).path("report.html"))
     return VerbResult(f"report  {path}", session.document(report=path))
 

@@ -16,8 +16,7 @@ from geomotion.manifolds.spline import fit_spline
 from geomotion.planning.manifold import Codes, Surface
 from geomotion.planning.planner import energy
 from geomotion.scores.evaluation import Evaluation
-from geomotion.scores.paths import PosePath
-from geomotion.scores.pose_support import PoseSupport
+from geomotion.scores.paths import MotionPath
 from geomotion.scores.score import Score
 from geomotion.stages import planners
 from geomotion.stages.graph import Skilled
@@ -35,7 +34,7 @@ class Compared:
     curves: list[MethodCurve]
 
 
-def compare_methods(skilled: Skilled, config: PlanningConfig, frame: EndEffectorFrame, ends: PosePath) -> Compared:
+def compare_methods(skilled: Skilled, config: PlanningConfig, frame: EndEffectorFrame, ends: MotionPath) -> Compared:
     """Length and energy in the thesis' metric, farthest distance from the data, and time, of each method.
 
     Args:
@@ -54,9 +53,9 @@ def compare_methods(skilled: Skilled, config: PlanningConfig, frame: EndEffector
         found[name] = _timed(partial(_descended, skilled, config, start))
     scores: dict[str, Score] = {}
     curves = []
+    demonstrated = skilled.manifold.space.support(skilled.manifold.data.paths)
     for name, (codes, seconds) in found.items():
-        poses = skilled.manifold.decode(codes).poses
-        apart_m, _ = PoseSupport.of(skilled.manifold.data.paths).distances(poses.position_m, poses.orientation)
+        apart_m, _ = demonstrated.distances(skilled.manifold.decode(codes).states)
         squared = energy(skilled.manifold, codes)
         scores |= {
             f"methods.{name}_length": Score(float(np.sqrt(squared)), "1"),
@@ -74,14 +73,14 @@ def _timed(method: Callable[[], Codes]) -> tuple[Codes, float]:
     return codes, time.perf_counter() - begun
 
 
-def _on_graph(skilled: Skilled, config: PlanningConfig, frame: EndEffectorFrame, ends: PosePath, count: int) -> Codes:
+def _on_graph(skilled: Skilled, config: PlanningConfig, frame: EndEffectorFrame, ends: MotionPath, count: int) -> Codes:
     manifold = skilled.manifold
     grid = LatentGrid(skilled.surface.grid.low, skilled.surface.grid.high, count)
-    surface = Surface.of(manifold, grid, PoseSupport.of(manifold.data.paths))
+    surface = Surface.of(manifold, grid, manifold.space.support(manifold.data.paths))
     unbound = replace(config, leave_data_m=ANYWHERE, leave_data_rad=ANYWHERE)
     planner = planners.planner(replace(skilled, surface=surface), unbound, frame)
     query = planner.query(ends[:1], ends[-1:])
-    return planner.fit(query, planner.search(query, (), 0.0, 0.0)).codes
+    return planner.fit(query, planner.search(query, (), 0.0)).codes
 
 
 def _descended(skilled: Skilled, config: PlanningConfig, start: Codes) -> Codes:

@@ -21,7 +21,9 @@ def _train_config(session: Session) -> TrainConfig:
     dataset = config.dataset
     return TrainConfig(
         # the base class: where recordings come from must not decide whether a training is repeated
-        selection=DatasetConfig(dataset.name, dataset.state_channels, dataset.train_demos, dataset.test_demos),
+        selection=DatasetConfig(
+            dataset.name, dataset.state_channels, dataset.train_demos, dataset.test_demos, dataset.held_out
+        ),
         model=ModelConfig(config.chart, config.field, config.regulariser, config.seed),
         training=config.training,
         seed=config.seed,

@@ -10,8 +10,10 @@ from jaxtyping import Float
 from geomotion.config import PlanningConfig, RobotConfig, ToolShape
 from geomotion.demos.demonstrations import Demonstrations
 from geomotion.obstacles.motion import MovingBody
-from geomotion.planning.controller import ControllerSettings, GeodesicController, Pace, steps_m
-from geomotion.scores.paths import PosePath
+from geomotion.planning.controller import ControllerSettings, GeodesicController, Pace
+from geomotion.robot.closed_loop import Target
+from geomotion.scores.configurations import ConfigurationPath
+from geomotion.scores.paths import MotionPath
 from geomotion.stages import planners
 from geomotion.stages.graph import Skilled
 
@@ -21,7 +23,7 @@ SETTLED_S = 0.5  # at the goal, after which a motion has ended
 
 @dataclass
 class Pilot:
-    """Hands the poses of controllers to a control loop, one leg after the other.
+    """Hands the states of controllers to a control loop, one leg after the other.
 
     Attributes:
         controllers: One for each leg, each beginning where the one before ends.
@@ -37,17 +39,19 @@ class Pilot:
 
     def __call__(
         self, time_s: float, position_m: Float[np.ndarray, "3"], orientation_wxyz: Float[np.ndarray, "4"]
-    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4"]]:
-        """The pose to be at one period later [m, wxyz]; where the arm is makes no difference."""
+    ) -> Target:
+        """The pose [m, wxyz] or the configuration [rad] of one period later; where the arm is makes no difference."""
         if self.controllers[self._leg].arrived and self._leg < len(self.controllers) - 1:
             self._leg += 1
         controller = self.controllers[self._leg]
         before, begun = controller.plans, time.perf_counter()
-        pose = controller.step(time_s, self.bodies)
+        state = controller.step(time_s, self.bodies)
         if controller.plans > before:
             self.seconds.append(time.perf_counter() - begun)
         self._settled_s = self._settled_s + controller.settings.period_s if self.reached_goal else 0.0
-        return pose.position_m[0], pose.orientation[0]
+        if isinstance(state, ConfigurationPath):
+            return np.asarray(state.joints_rad[0])
+        return state.position_m[0], state.orientation[0]
 
     @property
     def reached_goal(self) -> bool:
@@ -69,7 +73,7 @@ def make_pilot(
     planning: PlanningConfig,
     skilled: Skilled,
     demonstrations: Demonstrations,
-    stops: PosePath,
+    stops: MotionPath,
     bodies: Sequence[MovingBody],
 ) -> Pilot:
     """Follow the manifold from stop to stop at the demonstrations' pace.
@@ -99,8 +103,8 @@ def make_pilot(
 
 
 def demonstrated_pace(
-    paths: Sequence[PosePath],
-    progress: Sequence[Float[np.ndarray, " pose"]],
+    paths: Sequence[MotionPath],
+    progress: Sequence[Float[np.ndarray, " state"]],
     durations_s: Sequence[float],
     faster: float = 1.0,
 ) -> Pace:
@@ -108,13 +112,13 @@ def demonstrated_pace(
 
     Args:
         paths: Demonstrations, even in time.
-        progress: Share of the motion that is done at each of their poses.
+        progress: Share of the motion that is done at each of their states.
         durations_s: How long they take [s].
         faster: Times their own pace.
     """
     shares = np.linspace(0, 1, 50)
     speeds = [
-        np.interp(shares, (done[1:] + done[:-1]) / 2, steps_m(path) * (len(path) - 1) / duration_s)
+        np.interp(shares, (done[1:] + done[:-1]) / 2, path.steps_m() * (len(path) - 1) / duration_s)
         for path, done, duration_s in zip(paths, progress, durations_s, strict=True)
     ]
     mean = faster * np.mean(speeds, axis=0)

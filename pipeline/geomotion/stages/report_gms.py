@@ -14,6 +14,7 @@ from geomotion.figures.report.page import Data, Link, Page, render
 from geomotion.figures.report.pictures import Picture, film, pictures
 from geomotion.figures.report.scores import tables
 from geomotion.files import read_json, write_bytes, write_text
+from geomotion.stages.graph import LATENT_SCENE
 from geomotion.stages.report import ReportConfig, origin, recorded, training_facts
 from geomotion.tracking import Artefacts, StageRun
 
@@ -25,7 +26,7 @@ SCENE = "scene.html"
 
 
 def report_gms(config: ReportConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
-    """Write ``report.html``, and beside it the interactive ``scene.html``.
+    """Write ``report.html``, and beside it the interactive ``scene.html`` and, if there is one, ``latent.html``.
 
     Args:
         config: Title and command.
@@ -38,6 +39,8 @@ def report_gms(config: ReportConfig, inputs: Mapping[str, Artefacts], run: Stage
     """
     page = render(compose(config, inputs))
     write_bytes(run.folder / SCENE, inputs["plan"].path(SCENE).read_bytes())
+    if _has_latent_scene(inputs):
+        write_bytes(run.folder / LATENT_SCENE, inputs["plan"].path(LATENT_SCENE).read_bytes())
     write_text(run.folder / "report.html", page)
 
 
@@ -63,8 +66,18 @@ def compose(config: ReportConfig, inputs: Mapping[str, Artefacts]) -> Page:
         omitted=missing(shown, plan, replay) | _omitted(judged, inputs),
         listings=listings(plan, replay),
         film=_film(inputs),
-        links=(Link(SCENE, "interactive 3-D view", "of demonstrations, path and obstacles, to turn and zoom"),),
+        links=_links(inputs),
     )
+
+
+def _links(inputs: Mapping[str, Artefacts]) -> tuple[Link, ...]:
+    scene = Link(SCENE, "interactive 3-D view", "of demonstrations, path and obstacles, to turn and zoom")
+    latent = Link(LATENT_SCENE, "interactive latent space", "with its walls, the encoded demonstrations and the path")
+    return (scene, latent) if _has_latent_scene(inputs) else (scene,)
+
+
+def _has_latent_scene(inputs: Mapping[str, Artefacts]) -> bool:
+    return (inputs["plan"].folder / LATENT_SCENE).is_file()
 
 
 def _film(inputs: Mapping[str, Artefacts]) -> Picture | None:

@@ -36,12 +36,14 @@ class Artefacts:
         run_id: MLflow run that holds them.
         folder: Local, readable copy.
         digest: SHA-256 over the files that later stages read.
+        program: Command that runs the stage.
     """
 
     stage: str
     run_id: str
     folder: Path
     digest: str
+    program: str = "ncds"
 
     def path(self, name: str) -> Path:
         """A file or folder of the stage.
@@ -51,7 +53,7 @@ class Artefacts:
         """
         path = self.folder / name
         if not path.exists():
-            raise MissingArtefact(self.stage, name, self.run_id)
+            raise MissingArtefact(self.stage, name, self.run_id, self.program)
         return path
 
     def verify(self) -> None:

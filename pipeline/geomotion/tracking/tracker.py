@@ -277,7 +277,7 @@ class Tracker:
         else:
             with store.store_errors(self.uri):
                 folder = Path(self.client.download_artifacts(run.info.run_id, "", str(self._download_folder(run))))
-        return Artefacts(run.data.tags[STAGE], run.info.run_id, folder, run.data.tags[DIGEST])
+        return Artefacts(run.data.tags[STAGE], run.info.run_id, folder, run.data.tags[DIGEST], self.program)
 
     def _download_folder(self, run: "Run") -> Path:
         folder = self.work / "downloads" / str(run.info.run_id)

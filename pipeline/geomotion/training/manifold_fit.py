@@ -1,30 +1,30 @@
-"""Training a pose manifold in stages: means, kernels, spreads; from another seed where the latent space is bad."""
+"""Training a manifold in stages: means, kernels, spreads; from another seed where the latent space is bad."""
 
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import cKDTree
 
-from geomotion.config import Antipodal, ManifoldConfig, ManifoldTraining
+from geomotion.config import ManifoldConfig, ManifoldTraining
 from geomotion.errors import DatasetError
 from geomotion.manifolds.density import mean_distance_between
-from geomotion.networks.pose_vae import PoseVAE
-from geomotion.training.manifold import Health, PoseReconstruction, SpreadLikelihood, judge
-from geomotion.training.poses import PoseTrainingSet
+from geomotion.networks.pose_vae import SPREADS
+from geomotion.training.kinds import Kind, Network, kind_of
+from geomotion.training.manifold import Health, judge
+from geomotion.training.states import TrainingSet
 from geomotion.training.trainer import History, Log, Schedule, fit
 from geomotion.types import Float, Tensor
 
 logger = logging.getLogger(__name__)
 
-Build = Callable[[int], PoseVAE]
+Build = Callable[[int], Network]
 KMEANS_ROUNDS = 20
-TYPICAL_STD = 0.03  # where the spreads start, in units of the data's size
-TYPICAL_CONCENTRATION = 1000.0
 NEXT_SEED = 7919  # between attempts
 
 
@@ -39,14 +39,14 @@ class FittedManifold:
         histories: Logged losses of means and of spreads.
     """
 
-    network: PoseVAE
+    network: Network
     health: Health
     attempts: int
     histories: tuple[History, History]
 
 
 def fit_manifold(
-    data: PoseTrainingSet,
+    data: TrainingSet,
     config: ManifoldConfig,
     training: ManifoldTraining,
     build: Build,
@@ -66,23 +66,24 @@ def fit_manifold(
         log: Takes losses.
 
     Raises:
-        DatasetError: If there are fewer poses than kernels.
+        DatasetError: If there are fewer states than kernels.
         TrainingDiverged: If a loss becomes infinite.
         Interrupted: If a signal arrived.
     """
-    poses, progress = data.tensors(config.mixed_copies, config.antipodal is not Antipodal.aligned, seed)
-    if len(poses) < config.kernels:
-        found = f"{len(poses)} poses to train on, fewer than manifold.kernels={config.kernels}"
+    kind = kind_of(data, config)
+    states, progress = kind.samples(config.mixed_copies, seed)
+    if len(states) < config.kernels:
+        found = f"{len(states)} points to train on, fewer than manifold.kernels={config.kernels}"
         raise DatasetError("demonstrations", f"{found}; lower it, or raise manifold.points")
-    objective = PoseReconstruction(poses, progress, training, config.antipodal)
     means = checkpoint.with_name(f"{checkpoint.name}.means")
-    best: tuple[Health, PoseVAE, History] | None = None
+    best: tuple[Health, Network, History] | None = None
     for attempt in range(training.restarts + 1):
         own = seed + NEXT_SEED * attempt
         network = build(own)
         schedule = _schedule(training, training.steps, training.learning_rate, own)
+        objective = kind.means(states, progress, training)
         history = fit(network, objective, schedule, means.with_name(f"{means.name}{attempt}"), log)
-        health = _health(network, data, config)
+        health = _health(network, data, kind)
         if best is None or health.score > best[0].score:
             best = health, network, history
         if health.is_good:
@@ -95,8 +96,8 @@ def fit_manifold(
         )
     assert best is not None
     health, network, history = best
-    _place_kernels(network, poses, progress, config, seed)
-    spreads = _fit_spreads(network, poses, progress, config, training, seed, checkpoint, log)
+    _place_kernels(network, states, progress, config, seed)
+    spreads = _fit_spreads(network, kind.spreads(states, progress, training), training, seed, checkpoint, log)
     for number in range(attempt + 1):
         means.with_name(f"{means.name}{number}").unlink(missing_ok=True)
     return FittedManifold(network, health, attempt + 1, (history, spreads))
@@ -114,43 +115,33 @@ def _schedule(training: ManifoldTraining, steps: int, learning_rate: float, seed
     )
 
 
-def _health(network: PoseVAE, data: PoseTrainingSet, config: ManifoldConfig) -> Health:
-    poses, progress = data.tensors(0, False, 0)
+def _health(network: Network, data: TrainingSet, kind: Kind) -> Health:
+    states, progress = data.tensors(0, 0)
     with torch.no_grad():
-        codes = torch.split(network.encode(poses, progress)[0], [len(path) for path in data.paths])
-    return judge(network, poses, progress, mean_distance_between(codes, data.groups), config.antipodal)
+        codes = torch.split(network.encode(states, progress)[0], [len(path) for path in data.paths])
+    return judge(network, states, progress, mean_distance_between(codes, data.groups), kind.orientation_at)
 
 
 def _place_kernels(
-    network: PoseVAE,
-    poses: Float[Tensor, "point D"],
+    network: Network,
+    states: Float[Tensor, "point D"],
     progress: Float[Tensor, " point"],
     config: ManifoldConfig,
     seed: int,
 ) -> None:
     """Kernels at the centres of clusters of the codes, as wide as a multiple of their median spacing (Sec. 3.5.5)."""
     with torch.no_grad():
-        codes = network.encode(poses, progress)[0].double().numpy()
+        codes = network.encode(states, progress)[0].double().numpy()
     centres, _ = kmeans2(codes, config.kernels, KMEANS_ROUNDS, minit="++", rng=np.random.default_rng(seed))
     spacing = float(np.median(cKDTree(centres).query(centres, k=2)[0][:, 1]))
-    placed = torch.as_tensor(centres, dtype=torch.float32)
-    network.precision.place(placed, config.bandwidth * spacing, 1 / TYPICAL_STD)
-    network.concentration.place(placed, config.bandwidth * spacing, TYPICAL_CONCENTRATION)
+    network.place_kernels(torch.as_tensor(centres, dtype=torch.float32), config.bandwidth * spacing)
 
 
 def _fit_spreads(
-    network: PoseVAE,
-    poses: Float[Tensor, "point D"],
-    progress: Float[Tensor, " point"],
-    config: ManifoldConfig,
-    training: ManifoldTraining,
-    seed: int,
-    checkpoint: Path,
-    log: Log,
+    network: Network, objective: Any, training: ManifoldTraining, seed: int, checkpoint: Path, log: Log
 ) -> History:
     for name, parameter in network.named_parameters():
-        parameter.requires_grad_(name.startswith(("precision", "concentration")))
-    objective = SpreadLikelihood(poses, progress, training.batch_points, config.antipodal)
+        parameter.requires_grad_(name.startswith(SPREADS))
     schedule = _schedule(training, training.spread_steps, training.spread_learning_rate, seed)
 
     def log_later(step: int, values: dict[str, float]) -> None:

@@ -84,7 +84,6 @@ def lead_the_arm(intent: Intent, habits: Habits, config: GeneratedDataset, numbe
     Raises:
         InvalidSetting: If the variation asked for leads out of the arm's reach or beyond its joint limits.
     """
-    from geomotion.robot.chain import panda_chain
     from geomotion.robot.inverse_kinematics import solve_path
 
     time_s, position_m, orientation_wxyz = repeat(intent, habits, config, number)
@@ -97,15 +96,21 @@ def lead_the_arm(intent: Intent, habits: Habits, config: GeneratedDataset, numbe
     if path.unreachable:
         expected = f"less: demonstration {number} leads out of the arm's reach"
         raise InvalidSetting("dataset.variation", config.variation, expected)
-    joints_rad = path.joints_rad[LEAD_IN_POSES:]
+    return recorded(time_s, path.joints_rad[LEAD_IN_POSES:], orientation_wxyz, intent.label)
+
+
+def recorded(time_s: Array, joints_rad: Array, near_wxyz: Array, label: str) -> Trajectory:
+    """What the simulated arm records: joints, and poses of its grasp target, quaternions of the sign of those near."""
+    from geomotion.robot.chain import panda_chain
+
     position_m, reached_wxyz = panda_chain("grasp_target").pose(joints_rad)
-    signs = np.where(np.einsum("ti,ti->t", reached_wxyz, orientation_wxyz) < 0, -1.0, 1.0)
+    signs = np.where(np.einsum("ti,ti->t", reached_wxyz, near_wxyz) < 0, -1.0, 1.0)
     channels = {
         "position_m": position_m,
         "orientation_wxyz": reached_wxyz * signs[:, None],
         "joints_rad": joints_rad,
     }
-    return Trajectory(time_s, channels, intent.label)
+    return Trajectory(time_s, channels, label)
 
 
 def repeat(intent: Intent, habits: Habits, config: GeneratedDataset, number: int) -> tuple[Array, Array, Array]:
@@ -119,8 +124,8 @@ def repeat(intent: Intent, habits: Habits, config: GeneratedDataset, number: int
     way = np.linspace(0.0, 1.0, PATH_POINTS)
     duration_s = config.duration_s * float(np.exp(config.variation * DURATION_SPREAD * generator.standard_normal()))
     onset = np.clip(config.variation * ONSET_SPREAD * generator.standard_normal(), -ONSET_LIMIT, ONSET_LIMIT)
-    places = _through(intent.places_m, way) + config.variation * _wander(way, habits.position_m, generator)
-    wobble = config.variation * _wander(way, habits.orientation_rad, generator)
+    places = _through(intent.places_m, way) + config.variation * wander(way, habits.position_m, generator)
+    wobble = config.variation * wander(way, habits.orientation_rad, generator)
     start = Rotation.from_quat(intent.start_wxyz, scalar_first=True)
     turn = (Rotation.from_quat(intent.end_wxyz, scalar_first=True) * start.inv()).as_rotvec()
     begin, end = intent.turn
@@ -171,14 +176,14 @@ def _through(places_m: Array, way: Array) -> Array:
     return np.asarray(CubicSpline(passed / passed[-1], places_m, bc_type="natural")(way))
 
 
-def _wander(way: Array, spread: Spread, generator: np.random.Generator) -> Array:
-    """A smooth random departure from the way, shape (point, 3): from offset to offset, and a few waves between them.
+def wander(way: Array, spread: Spread, generator: np.random.Generator, axes: int = 3) -> Array:
+    """A smooth random departure from the way, shape (point, axes): from offset to offset, and a few waves between them.
 
     The waves are the first terms of the Karhunen–Loève series of a bridge, of standard deviation about 1 half-way.
     """
-    start, end = generator.standard_normal((2, 3))
+    start, end = generator.standard_normal((2, axes))
     numbers = np.arange(1, WAVES + 1)
-    waves = np.sin(np.pi * np.outer(way, numbers)) @ (generator.standard_normal((WAVES, 3)) / numbers[:, None] ** 2)
+    waves = np.sin(np.pi * np.outer(way, numbers)) @ (generator.standard_normal((WAVES, axes)) / numbers[:, None] ** 2)
     ends = np.outer(1 - way, spread.start * start) + np.outer(way, spread.end * end)
     return np.asarray(ends + spread.middle * waves)
 

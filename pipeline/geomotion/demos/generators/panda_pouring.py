@@ -51,7 +51,7 @@ def generate(config: PandaPouringDataset) -> Demonstrations:
     return Demonstrations(
         name=config.name,
         trajectories=tuple(
-            lead_the_arm(_intent(number % POURING_GROUPS), HABITS, config, number) for number in range(config.demos)
+            lead_the_arm(intent(number % POURING_GROUPS), HABITS, config, number) for number in range(config.demos)
         ),
         space="R3xS3",
         frame=FRAME,
@@ -73,7 +73,8 @@ def pour_pose(cup: int) -> tuple[Array, Quaternion]:
     return mouth - NECK_M * neck, turned(UPRIGHT_WXYZ, (0.0, TILT_RAD, 0.0))
 
 
-def _intent(bottle: int) -> Intent:
+def intent(bottle: int) -> Intent:
+    """What a hand is meant to do that pours from a bottle into the cup that belongs to it."""
     cup = CUP_OF_BOTTLE[bottle]
     (start, upright), (end, tipped) = grasp_pose(bottle), pour_pose(cup)
     lift = np.array([0.0, 0.0, LIFT_M])

@@ -60,7 +60,7 @@ def generate(config: PandaReachDataset) -> Demonstrations:
     return Demonstrations(
         name=config.name,
         trajectories=tuple(
-            lead_the_arm(_intent(number % len(TARGETS)), HABITS, config, number) for number in range(config.demos)
+            lead_the_arm(intent(number % len(TARGETS)), HABITS, config, number) for number in range(config.demos)
         ),
         space="R3xS3",
         frame=FRAME,
@@ -80,9 +80,10 @@ def grasp_wxyz(target: Target) -> Quaternion:
     return turned(DOWN_WXYZ, (np.pi / 2, 0.0, 0.0), (0.0, 0.0, target.bearing_rad))
 
 
-def _intent(number: int) -> Intent:
+def intent(number: int, start_m: tuple[float, float, float] = START_M) -> Intent:
+    """What a hand is meant to do that reaches for target `number`."""
     target = TARGETS[number]
-    start, end = np.array(START_M), np.array(target.place_m)
+    start, end = np.array(start_m), np.array(target.place_m)
     before = end - APPROACH_M * approach(target)
     half_way = (start + before) / 2 + ARCH_M
     places = np.stack([start, half_way, before, end])

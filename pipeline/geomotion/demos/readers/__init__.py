@@ -6,13 +6,18 @@ from geomotion.config import (
     JCDataset,
     LasaDataset,
     LettersDataset,
+    PandaCircleJointDataset,
     PandaPouringDataset,
+    PandaPouringJointDataset,
     PandaReachDataset,
+    PandaReachJointDataset,
+    PlanarSCurveDataset,
     RoboTasks9Dataset,
+    RoboTasks9JointDataset,
 )
 from geomotion.demos.demonstrations import Demonstrations
-from geomotion.demos.generators import jc, letters, panda_pouring, panda_reach
-from geomotion.demos.readers import folder, lasa, robotasks9
+from geomotion.demos.generators import jc, letters, panda_joint, panda_pouring, panda_reach, planar
+from geomotion.demos.readers import folder, lasa, robotasks9, robotasks9_joint
 
 __all__ = ["read"]
 
@@ -27,6 +32,8 @@ def read(config: DatasetConfig) -> Demonstrations:
     match config:
         case LasaDataset():
             return lasa.read(config)
+        case RoboTasks9JointDataset():
+            return robotasks9_joint.read(config)
         case RoboTasks9Dataset():
             return robotasks9.read(config)
         case FolderDataset():
@@ -39,5 +46,13 @@ def read(config: DatasetConfig) -> Demonstrations:
             return panda_reach.generate(config)
         case PandaPouringDataset():
             return panda_pouring.generate(config)
+        case PandaReachJointDataset():
+            return panda_joint.reach_to_grasp(config)
+        case PandaPouringJointDataset():
+            return panda_joint.pouring(config)
+        case PandaCircleJointDataset():
+            return panda_joint.circle(config)
+        case PlanarSCurveDataset():
+            return planar.generate(config)
         case _:
             raise TypeError(f"no reader for {type(config).__name__}")

@@ -10,9 +10,10 @@ from pathlib import Path
 from geomotion.config import FolderDataset
 from geomotion.demos import storage
 from geomotion.demos.columns import space_of
-from geomotion.demos.demonstrations import Demonstrations, Trajectory, validate
+from geomotion.demos.demonstrations import Demonstrations, validate
+from geomotion.demos.readers.joint_states import unrolled
 from geomotion.demos.readers.tables import TABLE_READERS, read_episodes
-from geomotion.demos.readers.trajectories import trajectories_of
+from geomotion.demos.readers.trajectories import Recording, recording_of
 from geomotion.errors import DatasetError, MissingData
 
 
@@ -31,8 +32,8 @@ def read(config: FolderDataset) -> Demonstrations:
         raise DatasetError(root, "this folder cannot be read: permission denied")
     if (root / storage.INFO).is_file():
         return _read_dataset(root, config)
-    trajectories = [trajectory for path in _recordings(root) for trajectory in _read_file(path, config)]
-    return _assemble(root, config, trajectories)
+    recordings = {path.name: _read_file(path, config) for path in _recordings(root)}
+    return _assemble(root, config, recordings)
 
 
 def _recordings(root: Path) -> list[Path]:
@@ -43,11 +44,11 @@ def _recordings(root: Path) -> list[Path]:
     return sorted(paths)
 
 
-def _read_file(path: Path, config: FolderDataset) -> list[Trajectory]:
+def _read_file(path: Path, config: FolderDataset) -> Recording:
     table = TABLE_READERS[path.suffix.lower()](path)
-    trajectories = trajectories_of(table, path, config)
-    validate(str(path), trajectories)
-    return trajectories
+    recording = recording_of(unrolled(table, path), path, config)
+    validate(str(path), recording.trajectories)
+    return recording
 
 
 def _read_dataset(root: Path, config: FolderDataset) -> Demonstrations:
@@ -58,14 +59,28 @@ def _read_dataset(root: Path, config: FolderDataset) -> Demonstrations:
         raise DatasetError(root / storage.INFO, f"not a JSON document ({error})") from error
     if storage.OWN_KEY in info:
         return storage.load(root)
-    return _assemble(root, config, trajectories_of(read_episodes(root, info), root, config))
+    return _assemble(root, config, {root.name: recording_of(read_episodes(root, info), root, config)})
 
 
-def _assemble(root: Path, config: FolderDataset, trajectories: list[Trajectory]) -> Demonstrations:
+def _assemble(root: Path, config: FolderDataset, recordings: dict[str, Recording]) -> Demonstrations:
+    trajectories = [trajectory for recording in recordings.values() for trajectory in recording.trajectories]
     validate(str(root), trajectories)
     return Demonstrations(
         name=config.name,
         trajectories=tuple(trajectories),
         space=space_of(dict(trajectories[0].channels)),
         source=f"recordings in {root.name}",
+        joint_names=_joint_names(root, recordings),
     )
+
+
+def _joint_names(root: Path, recordings: dict[str, Recording]) -> tuple[str, ...]:
+    """Of all files the same, so that no joint is taken for another."""
+    (first, names), *others = ((file, recording.joint_names) for file, recording in recordings.items())
+    for file, found in others:
+        if found != names:
+            said, expected = (", ".join(joints) or "none" for joints in (found, names))
+            raise DatasetError(
+                root / file, f"names joints {said}; expected {expected} as in {first}, in the same order"
+            )
+    return names

@@ -1,6 +1,7 @@
 """From a table of named columns to trajectories in SI units."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,10 @@ from geomotion.demos.columns import (
     BOOKKEEPING_COLUMNS,
     DEMO_COLUMNS,
     METRES_PER,
+    RADIANS_PER,
     TIME_COLUMNS,
     Column,
+    joint_names,
     parse,
     sorted_axes,
 )
@@ -23,24 +26,35 @@ from geomotion.demos.demonstrations import UNIT_AXES, VELOCITY_OF, Array, Trajec
 from geomotion.demos.readers.tables import Table
 from geomotion.errors import DatasetError
 
+JOINTS = "joints_rad"
 
-def trajectories_of(table: Table, path: Path, config: FolderDataset) -> list[Trajectory]:
+
+@dataclass(frozen=True)
+class Recording:
+    """What one file holds: demonstrations, and the names of their joints (empty where the file does not name them)."""
+
+    trajectories: list[Trajectory]
+    joint_names: tuple[str, ...]
+
+
+def recording_of(table: Table, path: Path, config: FolderDataset) -> Recording:
     """Translate columns to channels [m, rad] and split the rows into demonstrations.
 
     Args:
         table: Columns by name, one value per row.
         path: Where they come from, for messages and labels.
-        config: Gives the unit of unnamed lengths and the rate of recordings without time stamps.
+        config: Gives the units that columns do not name, names of joint columns, and the rate of recordings without
+            time stamps.
 
     Raises:
         DatasetError: If a column is unknown, doubled, missing or not numeric.
     """
-    known = {name: column for name in table if (column := parse(name))}
+    known = {name: column for name in table if (column := _parse(name, config))}
     _refuse_unknown(path, set(table) - set(known) - {*TIME_COLUMNS, *DEMO_COLUMNS, *BOOKKEEPING_COLUMNS})
     if not known:
         raise DatasetError(path, "holds no positions or joints; expected columns such as x, y or joint_1_rad")
     channels = {
-        channel: _channel(path, channel, table, known, METRES_PER[config.length_unit.value])
+        channel: _channel(path, channel, table, known, config)
         for channel in dict.fromkeys(column.channel for column in known.values())
     }
     _refuse_unpaired_velocities(path, known)
@@ -48,7 +62,7 @@ def trajectories_of(table: Table, path: Path, config: FolderDataset) -> list[Tra
     time_column = _only(path, table, TIME_COLUMNS)
     count = len(next(iter(channels.values())))
     groups = _groups(table[demo_column]) if demo_column else [(path.stem, np.arange(count))]
-    return [
+    trajectories = [
         Trajectory(
             time_s=_times(path, table, time_column, rows, config.sampling_rate_hz),
             channels={name: values[rows] for name, values in channels.items()},
@@ -56,9 +70,14 @@ def trajectories_of(table: Table, path: Path, config: FolderDataset) -> list[Tra
         )
         for label, rows in groups
     ]
+    return Recording(trajectories, joint_names(column.axis for column in known.values() if column.channel == JOINTS))
 
 
-def _channel(path: Path, channel: str, table: Table, known: dict[str, Column], metres_per_unit: float) -> Array:
+def _parse(name: str, config: FolderDataset) -> Column | None:
+    return Column(JOINTS, name, None) if name in config.joint_columns else parse(name)
+
+
+def _channel(path: Path, channel: str, table: Table, known: dict[str, Column], config: FolderDataset) -> Array:
     """Values of a channel in SI units, shape (row, axis)."""
     names: dict[str, str] = {}
     for name, column in known.items():
@@ -70,9 +89,11 @@ def _channel(path: Path, channel: str, table: Table, known: dict[str, Column], m
     values = np.stack([_numbers(path, name, table[name]) for name in columns], axis=1)
     if channel in UNIT_AXES:
         _require_all_axes(path, channel, names)
+    units = [known[name].unit for name in columns]
     if channel in ("position_m", "velocity_m_per_s"):
-        units = [known[name].unit for name in columns]
-        return np.asarray(values * [METRES_PER[unit] if unit else metres_per_unit for unit in units])
+        return np.asarray(values * [METRES_PER[unit or config.length_unit.value] for unit in units])
+    if channel in (JOINTS, VELOCITY_OF[JOINTS]):
+        return np.asarray(values * [RADIANS_PER[unit or config.angle_unit.value] for unit in units])
     return values
 
 
@@ -127,7 +148,8 @@ def _refuse_unknown(path: Path, names: set[str]) -> None:
         name = min(names)
         close = get_close_matches(name.lower(), ALL_COLUMNS, n=1, cutoff=0.4)
         hint = f"did you mean {close[0]!r}? " if close else ""
-        raise DatasetError(path, f"unknown column {name!r}; {hint}docs/data.md lists the names")
+        joints = "a joint of another name goes into dataset.joint_columns"
+        raise DatasetError(path, f"unknown column {name!r}; {hint}docs/data.md lists the names, and {joints}")
 
 
 def _refuse_unpaired_velocities(path: Path, known: dict[str, Column]) -> None:

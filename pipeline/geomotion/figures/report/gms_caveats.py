@@ -15,8 +15,8 @@ ALWAYS = (
 )
 NO_HELD_OUT = "No demonstration was held out: geodesics are judged against the training data."
 OBSTACLES = (
-    "The guaranteed clearance concerns the tool on the decoded path and the obstacles as they were described to the "
-    "planner. It says nothing about the arm's other links, about tracking errors, or about obstacles seen wrongly.",
+    "The guaranteed clearance concerns {} on the decoded path and the obstacles as they were described to the "
+    "planner. It says nothing about other parts of the arm, about tracking errors, or about obstacles seen wrongly.",
     "A plan sees moving obstacles where they are at time zero; only planning anew on the way answers their motion.",
 )
 SIMULATED = (
@@ -36,9 +36,9 @@ def caveats(summary: Document, scores: Document, plan: Document, replay: Documen
     """
     found = [_held_out(scores)]
     if plan["obstacles"]:
-        found += OBSTACLES
+        found += [text.format(plan["protected"]) for text in OBSTACLES]
     if (done := executed(replay)) is not None:
-        found += [SIMULATED, _frame(summary, done)]
+        found += [SIMULATED] if done["states"] == "configurations" else [SIMULATED, _frame(summary, done)]
         found += [CLEARANCES] if done["clearance_m"] else []
     return [*found, *ALWAYS]
 

@@ -10,7 +10,7 @@ from geomotion.figures.report.verdict import Finding
 from geomotion.robot.recording import MAX_CLEARANCE_M
 
 Document = Mapping[str, Any]
-NO_ROBOT = "the demonstrations are not poses in R³×S³, which a robot could take"
+NO_ROBOT = "the demonstrations are neither poses in R³×S³, which a robot could take, nor configurations of an arm"
 
 
 def executed(replay: Document | None) -> Document | None:
@@ -25,7 +25,7 @@ def findings(replay: Document | None) -> list[Finding]:
     done = executed(replay)
     if done is None:
         return [Finding(f"It was not executed: {replay['reason']}.", is_good=False)]
-    return [_tracking(done), *_reach(done), *_contacts(done), *_closed_loop(done)]
+    return [_tracking(done), *_reach(done), *_contacts(done), *_self_collision(done), *_closed_loop(done)]
 
 
 def mm(length_m: float) -> str:
@@ -44,17 +44,15 @@ def _short(value: float) -> str:
 
 
 def _tracking(replay: Document) -> Finding:
-    error_m, error_rad, margin_rad = (
-        float(replay[name]) for name in ("tracking_worst_m", "tracking_worst_rad", "limit_margin_rad")
-    )
+    error_m, error_rad = float(replay["tracking_worst_m"]), float(replay["tracking_worst_rad"])
+    margin_rad = replay["limit_margin_rad"]
     is_followed = 1000 * error_m <= POSITION_LIMIT_MM and np.degrees(error_rad) <= ORIENTATION_LIMIT_DEG
     asked = "" if is_followed else f" (asked for are {POSITION_LIMIT_MM:g} mm and {ORIENTATION_LIMIT_DEG:g}°)"
+    text = f"Measured in simulation: the arm follows with at most {mm(error_m)} and {deg(error_rad)} of error{asked}"
+    if margin_rad is None:
+        return Finding(f"{text}; its joints have no limits.", is_good=bool(is_followed))
     margin = f"every joint stays {deg(margin_rad)} or more away from" if margin_rad >= 0 else "a joint goes beyond"
-    text = (
-        f"Measured in simulation: the arm follows with at most {mm(error_m)} and {deg(error_rad)} of error{asked}, and "
-        f"{margin} its limits."
-    )
-    return Finding(text, is_good=bool(is_followed and margin_rad >= 0))
+    return Finding(f"{text}, and {margin} its limits.", is_good=bool(is_followed and margin_rad >= 0))
 
 
 def _reach(replay: Document) -> list[Finding]:
@@ -78,6 +76,14 @@ def _contacts(replay: Document) -> list[Finding]:
     name = f" ({link})" if nearest_m < MAX_CLEARANCE_M else ""
     near = f"nothing of the arm comes nearer to an obstacle than {mm(nearest_m)}{name}"
     return [Finding(f"Measured in simulation: {near}.")]
+
+
+def _self_collision(replay: Document) -> list[Finding]:
+    own = replay["self_clearance"]
+    if own is None or own["distance_m"] >= 0:
+        return []
+    overlap = f"{' and '.join(own['links'])} overlap by {mm(-own['distance_m'])}"
+    return [Finding(f"Measured in simulation, which takes links as convex: {overlap}.", is_good=False)]
 
 
 def _closed_loop(replay: Document) -> list[Finding]:

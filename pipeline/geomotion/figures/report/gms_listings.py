@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from geomotion.figures.report.gms_checks import check_listings
 from geomotion.figures.report.gms_execution import executed
 from geomotion.figures.report.gms_verdict import leg_name
 from geomotion.figures.report.page import Column, Listing
@@ -24,6 +25,7 @@ def listings(plan: Document, replay: Document | None) -> tuple[Listing, ...]:
     found = [_legs("The plan", plan["legs"])]
     if plan.get("others"):
         found.append(_legs("Other starts and goals", plan["others"]))
+    found += check_listings(plan)
     if (done := executed(replay)) is not None:
         found += [_execution(done), *_clearances(done), *_unreachable(done)]
     return tuple(found)
@@ -56,19 +58,29 @@ def _pair(scores: Document, name: str) -> str:
 
 def _execution(replay: Document) -> Listing:
     rows = {
+        "arm": str(replay["arm"]),
         "end-effector frame": str(replay["frame"]),
         "timing": f"{replay['timing']}, stretched {replay['stretch']:.2f} times",
         "duration": f"{replay['duration_s']:.2f} s",
-        "poses reached by inverse kinematics": f"{100 * replay['reached_share']:.4g} %",
-        "inverse kinematics, worst": _error(replay, "ik_worst"),
-        "tracking error, worst": _error(replay, "tracking_worst"),
-        "smallest joint-limit margin": f"{np.degrees(replay['limit_margin_rad']):.1f} deg",
     }
+    if replay["states"] == "poses":
+        rows["poses reached by inverse kinematics"] = f"{100 * replay['reached_share']:.4g} %"
+        rows["inverse kinematics, worst"] = _error(replay, "ik_worst")
+    rows["tracking error, worst"] = _error(replay, "tracking_worst")
+    margin_rad, own = replay["limit_margin_rad"], replay["self_clearance"]
+    rows["smallest joint-limit margin"] = "no limits" if margin_rad is None else f"{np.degrees(margin_rad):.1f} deg"
+    rows["links nearest to each other"] = (
+        _links(own) if own is not None else f"none within {1000 * MAX_CLEARANCE_M:.0f} mm"
+    )
     if replay["closed_loop"]:
         median = replay["replan_median_ms"]
         rows["replanned"] = f"{replay['replans']} times" + ("" if median is None else f", {median:.2g} ms median")
         rows["waited for obstacles"] = f"{replay.get('waited_s', 0.0):.2f} s"
     return Listing("On the simulated robot", (Column("what"), Column("value", is_text=True)), tuple(rows.items()))
+
+
+def _links(own: Document) -> str:
+    return f"{1000 * own['distance_m']:.1f} mm ({' to '.join(own['links'])})"
 
 
 def _error(replay: Document, name: str) -> str:

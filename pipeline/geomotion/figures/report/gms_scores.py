@@ -46,6 +46,7 @@ LABELS = {
     "planned_share": "Share for which a path was found",
     "pairs": "From every group's start to every group's goal, shown or not",
     "methods": "The same geodesic by several methods",
+    "arm_failures": "Joint solutions of decoded poses that touch the obstacle",
 }
 GEODESICS = Subject("Geodesics between the ends of demonstrations", ORDER, LABELS)
 

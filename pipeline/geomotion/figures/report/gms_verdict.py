@@ -4,12 +4,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from geomotion.figures.report import gms_execution
+from geomotion.figures.report.gms_checks import check_findings
 from geomotion.figures.report.gms_execution import deg, mm
 from geomotion.figures.report.verdict import Finding, Verdict
 
 Document = Mapping[str, Any]
 ROUNDING = 1e-6  # of a cap
-GUARANTEED = "clearance of the tool along the whole decoded path, for the obstacles as they were described"
+GUARANTEED = "clearance of {} along the whole decoded path, for the obstacles as they were described"
 MEASURED = "distance to the data and energy; in simulation also links, joint limits and tracking errors"
 TITLE = "Numbers"
 
@@ -27,7 +28,14 @@ def verdict(plan: Document, graph: Document, training: Document, replay: Documen
     if failed:
         return _no_path(plan, failed)
     legs = [leg["scores"] for leg in plan["legs"]]
-    found = [_clearance(plan, legs), _distance(plan, graph, legs), *_energy(legs), _ends(legs), *_health(training)]
+    found = [
+        _clearance(plan, legs),
+        *check_findings(plan),
+        _distance(plan, graph, legs),
+        *_energy(legs),
+        _ends(legs),
+        *_health(training),
+    ]
     found += gms_execution.findings(replay)
     sentences = tuple(finding.text for finding in found)
     if all(finding.is_good for finding in found):
@@ -51,7 +59,9 @@ def facts(plan: Document, replay: Document | None) -> tuple[tuple[str, str], ...
         "Start": str(plan["start"]),
         "Goal": str(plan["goal"]),
         "Obstacles": ", ".join(plan["obstacles"]) or "none",
-        "Guaranteed": GUARANTEED if plan["obstacles"] else "nothing: there were no obstacles to keep clear of",
+        "Guaranteed": GUARANTEED.format(plan["protected"])
+        if plan["obstacles"]
+        else "nothing: there were no obstacles to keep clear of",
         "Measured only": MEASURED,
     }
     if (done := gms_execution.executed(replay)) is not None:
@@ -82,11 +92,12 @@ def _clearance(plan: Document, legs: Sequence[Document]) -> Finding:
     names = f"every obstacle ({', '.join(plan['obstacles'])})"
     if min(kept_m) <= 0:
         return Finding(
-            "No clearance is guaranteed: on the decoded path, the tool may touch an obstacle.", is_good=False
+            f"No clearance is guaranteed: on the decoded path, {plan['protected']} may touch an obstacle.",
+            is_good=False,
         )
     return Finding(
-        f"Guaranteed, for the obstacles as they were described: along the whole decoded path, the tool stays at least "
-        f"{mm(min(kept_m))} away from {names}."
+        f"Guaranteed, for the obstacles as they were described: along the whole decoded path, {plan['protected']} "
+        f"stays at least {mm(min(kept_m))} away from {names}."
     )
 
 
