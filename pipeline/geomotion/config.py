@@ -116,7 +116,7 @@ class DatasetConfig:
     """What every dataset has, wherever it comes from."""
 
     name: str = MISSING
-    state_channels: list[str] = default(default_factory=lambda: ["position_m"])  # what a field is learned on
+    state_channels: list[str] | None = None  # what a field is learned on; null: position_m, or joints_rad without it
     train_demos: list[int] | None = (
         None  # null: all but the last ones held out (all, where less than half would be left)
     )
@@ -276,7 +276,7 @@ class JointDataset(GeneratedDataset):
     elbow: ElbowConfig = default(default_factory=ElbowConfig)
     demos: int = 15  # of all solutions, in turn
     duration_s: float = 6.0
-    state_channels: list[str] = default(default_factory=lambda: ["joints_rad"])
+    state_channels: list[str] | None = default(default_factory=lambda: ["joints_rad"])
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -342,7 +342,7 @@ class RoboTasks9JointDataset(RoboTasks9Dataset):
     points: int = 200  # of each recording, even in time
     variation: float = 1.0  # of the elbow between recordings; 0: none, 1: about what people do
     seed: int = 0
-    state_channels: list[str] = default(default_factory=lambda: ["joints_rad"])
+    state_channels: list[str] | None = default(default_factory=lambda: ["joints_rad"])
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -361,7 +361,7 @@ class PlanarSCurveDataset(GeneratedDataset):
     demos: int = 14  # of both branches, in turn
     duration_s: float = 3.0
     size_m: float = 0.2  # height of the S
-    state_channels: list[str] = default(default_factory=lambda: ["joints_rad"])
+    state_channels: list[str] | None = default(default_factory=lambda: ["joints_rad"])
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from geomotion.config import DatasetConfig
 from geomotion.demos.demonstrations import Demonstrations, Trajectory
-from geomotion.demos.selection import check_state_channels, split
+from geomotion.demos.selection import split, state_channels
 from geomotion.errors import InvalidSetting, UnknownName
 
 
@@ -52,11 +54,17 @@ def test_a_split_that_cannot_be_is_refused(train, test, words):
         split(DatasetConfig(name="some", train_demos=train, test_demos=test), some(5))
 
 
+def test_without_a_choice_positions_are_learned_and_joints_where_there_are_none(poses):
+    assert state_channels(DatasetConfig(name="x"), poses) == ("position_m",)
+    joints = [replace(one, channels={"joints_rad": one.channels["joints_rad"]}) for one in poses.trajectories]
+    assert state_channels(DatasetConfig(name="x"), replace(poses, trajectories=tuple(joints))) == ("joints_rad",)
+
+
 def test_state_channels_must_exist_and_have_velocities(poses):
-    check_state_channels(DatasetConfig(name="x", state_channels=["position_m", "joints_rad"]), poses)
+    state_channels(DatasetConfig(name="x", state_channels=["position_m", "joints_rad"]), poses)
     with pytest.raises(UnknownName, match="Did you mean 'position_m'"):
-        check_state_channels(DatasetConfig(name="x", state_channels=["positions"]), poses)
+        state_channels(DatasetConfig(name="x", state_channels=["positions"]), poses)
     with pytest.raises(InvalidSetting, match="channels with a velocity"):
-        check_state_channels(DatasetConfig(name="x", state_channels=["orientation_wxyz"]), poses)
+        state_channels(DatasetConfig(name="x", state_channels=["orientation_wxyz"]), poses)
     with pytest.raises(InvalidSetting, match="some of"):
-        check_state_channels(DatasetConfig(name="x", state_channels=[]), poses)
+        state_channels(DatasetConfig(name="x", state_channels=[]), poses)

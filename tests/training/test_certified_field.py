@@ -16,7 +16,7 @@ from geomotion.training.trajectories import TrajectoryReproduction
 def letters() -> TrainingSet:
     config = schema.LettersDataset(name="letters/s", letter="s", points=200)
     demonstrations = preprocess(readers.read(config), config.preprocess)
-    return TrainingSet.from_demonstrations(demonstrations.select(range(5)), config.state_channels)
+    return TrainingSet.from_demonstrations(demonstrations.select(range(5)), ("position_m",))
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from geomotion.config import DatasetConfig
 from geomotion.demos.demonstrations import VELOCITY_OF, Demonstrations
 from geomotion.errors import InvalidSetting, UnknownName
 
+PREFERRED = ("position_m", "joints_rad")  # what a field is learned on, where nothing else is said
 HELD_OUT = 2  # by default, where at least two remain to train on
 
 
@@ -29,22 +30,26 @@ def split(config: DatasetConfig, demonstrations: Demonstrations) -> tuple[tuple[
     return tuple(train), tuple(test)
 
 
-def check_state_channels(config: DatasetConfig, demonstrations: Demonstrations) -> None:
-    """Check that a field can be learned on the chosen channels.
+def state_channels(config: DatasetConfig, demonstrations: Demonstrations) -> tuple[str, ...]:
+    """The chosen channels, if a field can be learned on them; unless they are chosen, positions, or else joints.
 
     Raises:
         UnknownName: If the recordings have no such channel.
         InvalidSetting: If no channel is chosen, one twice, or one whose time derivative is no velocity channel.
     """
-    if not config.state_channels:
+    chosen = config.state_channels
+    if chosen is None:
+        chosen = next(([name] for name in PREFERRED if name in demonstrations.channel_names), list(PREFERRED[:1]))
+    if not chosen:
         raise InvalidSetting("dataset.state_channels", [], f"some of {list(demonstrations.channel_names)}")
-    if len(set(config.state_channels)) < len(config.state_channels):
-        raise InvalidSetting("dataset.state_channels", config.state_channels, "different channels")
-    for name in config.state_channels:
+    if len(set(chosen)) < len(chosen):
+        raise InvalidSetting("dataset.state_channels", chosen, "different channels")
+    for name in chosen:
         if name not in demonstrations.channel_names:
             raise UnknownName(f"channel of {demonstrations.name}", name, demonstrations.channel_names)
         if name not in VELOCITY_OF:
             raise InvalidSetting("dataset.state_channels", name, f"channels with a velocity: {', '.join(VELOCITY_OF)}")
+    return tuple(chosen)
 
 
 def _check(key: str, demos: Sequence[int], count: int) -> None:

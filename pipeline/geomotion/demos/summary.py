@@ -6,13 +6,13 @@ import numpy as np
 
 from geomotion.config import DatasetConfig
 from geomotion.demos.demonstrations import CHANNEL_UNITS, Demonstrations, Trajectory
-from geomotion.demos.selection import split
+from geomotion.demos.selection import split, state_channels
 
 
 def summarise(demonstrations: Demonstrations, config: DatasetConfig) -> dict[str, Any]:
     """Summary as JSON types; lengths and speeds are those of the first state channel, in its unit."""
     train, test = split(config, demonstrations)
-    channel = config.state_channels[0]
+    channel = state_channels(config, demonstrations)[0]
     sets = {**dict.fromkeys(train, "train"), **dict.fromkeys(test, "test")}
     demos = [
         {"demo": number, "label": trajectory.label, "set": sets.get(number, "unused"), **_numbers(trajectory, channel)}

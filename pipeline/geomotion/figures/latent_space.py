@@ -126,12 +126,14 @@ def _scales(maps: LatentMaps) -> Float[np.ndarray, " 3"]:
 def _frame(ax: Axes3D, maps: LatentMaps, view: tuple[float, float]) -> None:
     low, high = maps.corners
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(tuple(((high - low) * _scales(maps)).tolist()), zoom=ZOOM)
+    drawn = (high - low) * _scales(maps)
+    ax.set_box_aspect(tuple(drawn.tolist()), zoom=ZOOM)
     ax.set_proj_type("ortho")
     ax.view_init(*view)
     for number, axis in enumerate((ax.xaxis, ax.yaxis, ax.zaxis)):
         axis.set_label_text(f"$z_{number + 1}$ [1]")
-        axis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
+        ticks = max(1, round(4 * drawn[number] / drawn.max()))  # of a short axis, labels would lie on each other
+        axis.set_major_locator(MaxNLocator(nbins=ticks, steps=[1, 2, 5, 10]))
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.line.set_linewidth(0.6)
         axis.labelpad = -6.0

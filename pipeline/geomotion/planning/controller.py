@@ -159,7 +159,7 @@ class GeodesicController:
         if time_s - self._planned_s > self.settings.replan_every_s and not self.arrived:
             return False
         wanted = self.planner.settings.constraint.clearance_m
-        kept = self.planner.clearances(self._way.ahead, bodies, time_s)
+        kept = self.planner.clearances(self._way.ahead, bodies, time_s, enough_m=wanted)
         return bool(kept.min(initial=np.inf) >= wanted)
 
     def _replan(self, time_s: float, bodies: Sequence[MovingBody]) -> None:

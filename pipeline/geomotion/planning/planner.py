@@ -63,12 +63,12 @@ class Route:
     Attributes:
         found: On the graph.
         curve: To execute.
-        clearance_m: Distance between robot and obstacles that it surely keeps [m].
+        closely: Whether its clearance shows only in smaller balls.
     """
 
     found: GraphPath
     curve: FittedCurve
-    clearance_m: float
+    closely: bool
 
 
 class Planner:
@@ -153,7 +153,8 @@ class Planner:
         route = self.route(query, bodies, time_s, guess)
         if route is None:
             return diagnose(self, query, bodies, time_s)
-        return self.judged(query, route.curve, route.clearance_m)
+        kept = self.clearances(route.curve, bodies, time_s, route.closely)
+        return self.judged(query, route.curve, float(kept.min(initial=np.inf)))
 
     def route(
         self,
@@ -187,9 +188,9 @@ class Planner:
             if not found.exists:
                 return None
             curve = self.fit(query, found)
-            kept = self.clearances(curve, bodies, time_s, closely)
+            kept = self.clearances(curve, bodies, time_s, closely, constraint.clearance_m)
             if not constraint.hard or kept.min(initial=np.inf) >= constraint.clearance_m:
-                return Route(found, curve, float(kept.min(initial=np.inf)))
+                return Route(found, curve, closely)
             self.graph.shut(self._near(query, found, curve, kept < constraint.clearance_m))
             guess = found
         return None
@@ -226,15 +227,23 @@ class Planner:
         return fit_curve(self.manifold, self.surface, query.offsets, query.ends, found, self.graph, self.settings)
 
     def clearances(
-        self, curve: FittedCurve, bodies: Sequence[MovingBody], time_s: float, closely: bool = False
+        self,
+        curve: FittedCurve,
+        bodies: Sequence[MovingBody],
+        time_s: float,
+        closely: bool = False,
+        enough_m: float = np.inf,
     ) -> Float[np.ndarray, " step"]:
-        """Distances between robot and obstacles that are kept along the steps of a curve [m]; empty without any."""
+        """Distances between robot and obstacles that are kept along the steps of a curve [m]; empty without any.
+
+        Those above `enough_m` may be bounds far below the distance.
+        """
         if not bodies:
             return np.zeros(0)
         constraint, shape = self.settings.constraint, self.settings.shape
         if closely and shape.finer is not None:
             shape = shape.finer
-        return kept_clearances(curve.path.states, shape, bodies, time_s, constraint.horizon_s)
+        return kept_clearances(curve.path.states, shape, bodies, time_s, constraint.horizon_s, enough_m)
 
     # ------------------------------------------------------------ judging
     def _refuse(self, query: Query, bodies: Sequence[MovingBody], time_s: float) -> Plan | None:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from geomotion.config import DatasetConfig
 from geomotion.demos import readers, storage
 from geomotion.demos.preprocessing import preprocess
-from geomotion.demos.selection import check_state_channels, split
+from geomotion.demos.selection import split, state_channels
 from geomotion.demos.summary import summarise, summary_table
 from geomotion.figures.demonstrations import figure_data, figure_demonstrations
 from geomotion.figures.style import save_figure
@@ -27,7 +27,7 @@ def ingest(config: DatasetConfig, inputs: Mapping[str, Artefacts], run: StageRun
         InvalidSetting: If the configuration does not fit them.
     """
     demonstrations = preprocess(readers.read(config), config.preprocess)
-    check_state_channels(config, demonstrations)
+    state_channels(config, demonstrations)  # refuses wrong ones before anything is written
     _, held_out = split(config, demonstrations)
     digest = storage.save(demonstrations, run.folder)
     run.log_dataset(demonstrations.name, digest, demonstrations.source)

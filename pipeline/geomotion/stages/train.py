@@ -8,7 +8,7 @@ import pandas as pd
 from geomotion import config as schema
 from geomotion import models
 from geomotion.demos import storage
-from geomotion.demos.selection import check_state_channels, split
+from geomotion.demos.selection import split, state_channels
 from geomotion.dynamics.certificate import certify
 from geomotion.dynamics.fields import ChartedField
 from geomotion.errors import DatasetError, InvalidSetting
@@ -49,9 +49,8 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
         Interrupted: If a signal arrived.
     """
     demonstrations = storage.load(inputs["ingest"].folder)
-    check_state_channels(config.selection, demonstrations)
+    channels = state_channels(config.selection, demonstrations)
     train_demos, test_demos = split(config.selection, demonstrations)
-    channels = tuple(config.selection.state_channels)
     data = TrainingSet.from_demonstrations(demonstrations.select(train_demos), channels)
     geometry = Geometry.of(data)
     if geometry.scale_m == 0:

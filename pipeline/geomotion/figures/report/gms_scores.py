@@ -9,14 +9,17 @@ from geomotion.figures.report.scores import SETS, Headline, Scores, Subject, qua
 ORDER: Mapping[str, tuple[str, ...]] = {
     "position_dtwd_ratio": ("position_dtwd_ratio_of_averaged_demo", "position_dtwd_ratio_of_straight_line"),
     "orientation_dtwd_ratio": ("orientation_dtwd_ratio_of_averaged_demo", "orientation_dtwd_ratio_of_straight_line"),
+    "joint_dtwd_ratio": ("joint_dtwd_ratio_of_averaged_demo", "joint_dtwd_ratio_of_straight_line"),
     "position_dtwd_per_point": (),
     "orientation_dtwd_per_point": (),
+    "joint_dtwd_per_point": (),
     "farthest_from_data": ("farthest_from_data_of_demo",),
     "farthest_turn_from_data": ("farthest_turn_from_data_of_demo",),
     "share_in_support": (),
     "energy": ("energy_of_straight_line",),
     "turning": ("turning_of_demo",),
     "jerk": ("jerk_of_demo",),
+    "group_switches": (),
     "start_residual": (),
     "goal_residual": (),
     "planned_share": (),
@@ -28,8 +31,12 @@ LABELS = {
     "orientation_dtwd_ratio": "DTWD / distance between demonstrations, orientation",
     "orientation_dtwd_ratio_of_averaged_demo": "averaged demonstration instead",
     "orientation_dtwd_ratio_of_straight_line": "straight latent line instead",
+    "joint_dtwd_ratio": "DTWD / distance between demonstrations, joints",
+    "joint_dtwd_ratio_of_averaged_demo": "averaged demonstration instead",
+    "joint_dtwd_ratio_of_straight_line": "straight latent line instead",
     "position_dtwd_per_point": "DTWD per point, position",
     "orientation_dtwd_per_point": "DTWD per point, orientation",
+    "joint_dtwd_per_point": "DTWD per point, joints",
     "farthest_from_data": "Farthest from the data",
     "farthest_from_data_of_demo": "the demonstrations themselves",
     "farthest_turn_from_data": "Largest angle to orientations demonstrated nearby",
@@ -41,6 +48,7 @@ LABELS = {
     "turning_of_demo": "the demonstrations themselves",
     "jerk": "Dimensionless jerk",
     "jerk_of_demo": "the demonstrations themselves",
+    "group_switches": "Changes between groups of demonstrations",
     "start_residual": "Manifold to the wanted start",
     "goal_residual": "Manifold to the wanted goal",
     "planned_share": "Share for which a path was found",
@@ -61,7 +69,7 @@ def headlines(scores: Scores, replay: Mapping[str, Any] | None) -> list[Headline
     name = next((name for name in reversed(SETS) if any(score.startswith(f"{name}.") for score in scores)), "")
     kind = f"{SETS.get(name, '')} demonstrations".replace("held out", "held-out")
     chosen = []
-    for part in ("position", "orientation"):
+    for part in ("position", "orientation", "joint"):
         ratio = f"{name}.{part}_dtwd_ratio"
         if ratio in scores:
             note = f"{kind}; averaged demonstration {quantity(scores, f'{ratio}_of_averaged_demo')}; another one is 1"
