@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
 
 from geomotion.manifolds.curves import descend
 from geomotion.manifolds.graph import GeodesicGraph, GraphPath
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
     from geomotion.planning.planner import PlannerSettings
 
 LONGEST = 1.05  # times the graph path: a spline longer than that has left its tube
-DOUBLINGS = (1, 2, 4)  # of the control points, before the graph path itself is taken
+LONGEST_UNCHECKED = 1.1  # the same where edges stay open: tubes of arms are thin, and a path with corners is no motion
+DOUBLINGS = (1, 2, 4, 8)  # of the control points, before the graph path itself is taken
+ROUNDING = 0.015  # of the graph path's corners: standard deviation, as a share of the path
 
 
 @dataclass(frozen=True)
@@ -52,10 +55,9 @@ def fit_curve(
     nodes = surface.grid.nodes[found.nodes]
     codes = polyline(nodes, settings.samples)
     length = _length(surface, graph, codes)
-    allowed = LONGEST * length
-    for spline in _splines(manifold, nodes, settings):
-        points = spline.points(settings.samples)
-        if not (graph.is_free(surface.grid.nearest(points)).all() and surface.grid.contains(points).all()):
+    allowed = (LONGEST if settings.closes_edges else LONGEST_UNCHECKED) * length
+    for points in _smooth(manifold, nodes, codes, settings):
+        if not (_stays(surface, graph, points, settings) and surface.grid.contains(points).all()):
             continue
         smooth_length = _length(surface, graph, points)
         if smooth_length <= allowed:
@@ -64,6 +66,30 @@ def fit_curve(
     decoded = manifold.decode(codes)
     carried = carried_to(decoded.states, ends, decoded.progress, offsets)
     return FittedCurve(codes, DecodedPath(carried, decoded.progress), length, found.cost)
+
+
+def _smooth(
+    manifold: SkillManifold,
+    nodes: Float[np.ndarray, "node d"],
+    corners: Float[np.ndarray, "point d"],
+    settings: "PlannerSettings",
+) -> Iterator[Float[np.ndarray, "point d"]]:
+    """Points of splines, and at last those of the graph path with its corners rounded."""
+    for spline in _splines(manifold, nodes, settings):
+        yield spline.points(settings.samples)
+    rounded = gaussian_filter1d(corners, ROUNDING * len(corners), axis=0, mode="nearest")
+    rounded[[0, -1]] = corners[[0, -1]]
+    yield rounded
+
+
+def _stays(
+    surface: Surface, graph: GeodesicGraph, points: Float[np.ndarray, "point d"], settings: "PlannerSettings"
+) -> bool:
+    """Whether points are on free nodes; where edges stay open, next to them is enough: the curve itself is checked."""
+    if settings.closes_edges:
+        return bool(graph.is_free(surface.grid.nearest(points)).all())
+    around, _ = surface.grid.corners(points)
+    return bool(graph.is_free(around.ravel()).reshape(around.shape).any(axis=1).all())
 
 
 def _splines(

@@ -41,9 +41,9 @@ CAPTIONS: Captions = {
     ),
     "arm_failures": (
         "What inverse kinematics makes of poses",
-        "At each pose of the latent plane inside the support cap, the share of random joint solutions with which the arm "
-        "touches the obstacle. No demonstration of the hand need do so: where it is dark, planning for the hand alone is "
-        "not enough.",
+        "At each pose of the latent plane inside the support cap, the share of random joint solutions with which the "
+        "arm touches the obstacle. No demonstration of the hand need do so: where it is dark, planning for the hand "
+        "alone is not enough.",
     ),
     "replay": (
         "On the robot",
