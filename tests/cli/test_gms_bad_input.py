@@ -116,7 +116,7 @@ class TestRecordings:
 
 
 SETTINGS = {
-    "a grid too large": (("graph.points_per_axis=20000",), "would need about 328 GiB, the limit is 4 GiB"),
+    "a grid too large": (("graph.points_per_axis=20000",), "would need about 355 GiB, the limit is 4 GiB"),
     "four latent dimensions": (("manifold.latent_dim=4",), "expected 2 or 3: geodesics need a grid"),
     "a number that is none": (("planning.start=[0.4,0,nan,1,0,0,0]",), "planning.start is or holds a number"),
     "an endless clearance": (("planning.clearance_m=inf",), "planning.clearance_m is or holds a number"),
@@ -136,7 +136,7 @@ def test_settings_that_make_no_sense_are_refused_before_anything_is_computed(wha
 
 def test_a_grid_too_large_for_a_trained_run_is_refused_too(refused, trained):
     refused(
-        ("gms", "graph", f"run={trained}", "graph.points_per_axis=20000"), "graph.points_per_axis=2209 fits", "graph", 2
+        ("gms", "graph", f"run={trained}", "graph.points_per_axis=20000"), "graph.points_per_axis=2124 fits", "graph", 2
     )
 
 

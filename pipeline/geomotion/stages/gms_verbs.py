@@ -35,9 +35,10 @@ def _graph_config(session: Session) -> GraphStageConfig:
 
 
 def _require_graph_fits(config: GmsConfig) -> None:
-    """Before anything is trained, where the configuration says how large the grid is."""
-    if config.graph.points_per_axis is not None and config.manifold.latent_dim is not None:
-        require_memory(config.graph.points_per_axis, config.manifold.latent_dim, memory_limit_bytes(config.graph))
+    """Before anything is trained; a latent space of unknown dimension has two at least."""
+    if config.graph.points_per_axis is not None:
+        dim = config.manifold.latent_dim or LEAST_DIM
+        require_memory(config.graph.points_per_axis, dim, memory_limit_bytes(config.graph))
 
 
 def _plan_config(session: Session) -> PlanStageConfig:
@@ -160,6 +161,7 @@ def _run(session: Session) -> VerbResult:
     return VerbResult(text, document, exit_code=0 if succeeded else NO_PATH, objective=evaluated.objective)
 
 
+LEAST_DIM = 2  # of a latent space
 NO_PATH = 3  # no path, or one that the arm cannot take: an answer, not a mistake; scripts can tell it from both
 
 GMS = Program(
