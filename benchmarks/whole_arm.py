@@ -69,7 +69,7 @@ ROOMY_M = 0.025  # kept by demonstrations whose room is not used up by what the 
 BETWEEN_STATES_M = 0.01  # by which a link may come nearer between two states of a demonstration
 RANDOM_AT, RANDOM_SOLUTIONS = 12, 20  # poses of a path of the hand, joint solutions of each
 SPHERE = "sphere"
-DATASET = "dataset=panda/reach_to_grasp_joint"
+DATASET = "dataset=panda/reach_to_grasp_overlap"
 
 
 @dataclass(frozen=True)

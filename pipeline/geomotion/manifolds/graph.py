@@ -152,6 +152,10 @@ class GeodesicGraph:
         self._felt = np.union1d(self._felt, nodes)
         self._update(self._lattice.touching(np.asarray(nodes, dtype=np.intp)))
 
+    def is_clear(self, nodes: Int[np.ndarray, " some"]) -> Bool[np.ndarray, " some"]:
+        """Whether nodes are outside what obstacles take."""
+        return np.asarray(self._room[nodes] >= 0)
+
     def is_free(self, nodes: Int[np.ndarray, " some"]) -> Bool[np.ndarray, " some"]:
         """Whether nodes are open and outside what obstacles take."""
         return np.asarray(self._open[nodes] & (self._room[nodes] >= 0))

@@ -85,11 +85,12 @@ def _smooth(
 def _stays(
     surface: Surface, graph: GeodesicGraph, points: Float[np.ndarray, "point d"], settings: "PlannerSettings"
 ) -> bool:
-    """Whether points are on free nodes; where edges stay open, next to them is enough: the curve itself is checked."""
+    """Whether points are on free nodes; where edges stay open, next to open ones is enough if no obstacle is there."""
+    nearest = surface.grid.nearest(points)
     if settings.closes_edges:
-        return bool(graph.is_free(surface.grid.nearest(points)).all())
+        return bool(graph.is_free(nearest).all())
     around, _ = surface.grid.corners(points)
-    return bool(graph.is_free(around.ravel()).reshape(around.shape).any(axis=1).all())
+    return bool(graph.is_clear(nearest).all() and graph.is_free(around.ravel()).reshape(around.shape).any(axis=1).all())
 
 
 def _splines(
