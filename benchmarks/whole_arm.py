@@ -325,23 +325,23 @@ def summary(trials: Sequence[Trial], *, free: bool) -> list[tuple[str, str]]:
     found = [trial for trial in trials if trial.plan.found]
     roomy = [trial for trial in trials if trial.placement.room_m >= ROOMY_M]
     kept = [trial for trial in found if trial.nearest_m >= CLEARANCE_M]
-    nearest_mm = [1e3 * trial.nearest_m for trial in found]
+    nearest = f"; nearest {min(1e3 * trial.nearest_m for trial in found):.1f} mm" if found else ""
     seconds = np.array([trial.seconds for trial in trials])
     others = Counter(trial.plan.status.name for trial in trials if not trial.plan.found)
     of_hand = [trial for trial in trials if trial.hand_planned]
     by_link = Counter(link for trial in of_hand for link in trial.touched_from_start)
-    shares = [trial.worst_share for trial in of_hand]
+    shares = [trial.worst_share for trial in of_hand] or [np.nan]
     rows = [
         ("joint space: planned", f"{len(found)} of {count}"),
         (f"  where {1e3 * ROOMY_M:.0f} mm are free", f"{sum(one.plan.found for one in roomy)} of {len(roomy)}"),
-        ("  every link keeps 1 cm", f"{len(kept)} of {len(found)}; nearest {min(nearest_mm, default=np.nan):.1f} mm"),
+        ("  every link keeps 1 cm", f"{len(kept)} of {len(found)}{nearest}"),
         ("  not planned", ", ".join(f"{name}: {number}" for name, number in others.items()) or "none"),
         ("  time of a plan", f"{np.median(seconds):.2f} s median, {np.percentile(seconds, 90):.2f} s p90"),
         ("task space: hand planned", f"{len(of_hand)} of {count}"),
         ("  arm touches the sphere", f"{sum(bool(trial.touched_from_start) for trial in of_hand)} of {len(of_hand)}, "
                                      f"{sum(bool(trial.touched) for trial in of_hand)} from home's branch"),
         ("  of random solutions", f"{np.mean(shares):.0%} at the worst pose of a path on average, "
-                                  f"{max(shares, default=np.nan):.0%} at most"),
+                                  f"{max(shares):.0%} at most"),
         ("  links that touch", ", ".join(f"{link}: {number}" for link, number in sorted(by_link.items())) or "none"),
     ]  # fmt: skip
     return rows if free else [rows[0], *rows[2:5]]
