@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from geomotion.robot.arm import Arm
-from geomotion.robot.pose_search import DAMPING_M2, LEVER_M
+from geomotion.robot.pose_search import DAMPING_M2, LEVER_M, jacobians
 from geomotion.types import Float
 
 ITERATIONS = 6
@@ -34,15 +34,8 @@ def lead(
         frames = arm.chain.frames(joints)
         turn = targets * Rotation.from_matrix(frames[-1, :, :3, :3]).inv()
         error = np.concatenate([positions_m - frames[-1, :, :3, 3], LEVER_M * turn.as_rotvec()], axis=1)
-        J = _jacobians(arm, frames)
+        J = jacobians(arm.chain, frames)
         damping = (np.square(error).sum(axis=1) / 2 + DAMPING_M2)[:, None, None] * np.eye(6)
         step = (J.transpose(0, 2, 1) @ np.linalg.solve(J @ J.transpose(0, 2, 1) + damping, error[:, :, None]))[:, :, 0]
         joints = np.clip(joints + step.clip(-LARGEST_STEP_RAD, LARGEST_STEP_RAD), lower, upper)
     return joints
-
-
-def _jacobians(arm: Arm, frames: Float[np.ndarray, "frame state 4 4"]) -> Float[np.ndarray, "state 6 joint"]:
-    """Of the tip's position [m/rad] and, times the lever, of its turning."""
-    axes = (frames[:-1, :, :3, :3] @ arm.chain.axes[:, None, :, None])[..., 0]
-    levers = frames[-1, :, :3, 3] - frames[:-1, :, :3, 3]
-    return np.concatenate([np.cross(axes, levers), LEVER_M * axes], axis=2).transpose(1, 2, 0)

@@ -63,3 +63,10 @@ def pose_error(reached: Float[np.ndarray, "4 4"], target: Float[np.ndarray, "4 4
     """What is left to the target: position [m] and rotation vector times the lever [m], in the base frame."""
     turn = Rotation.from_matrix(target[:3, :3] @ reached[:3, :3].T).as_rotvec()
     return np.concatenate([target[:3, 3] - reached[:3, 3], LEVER_M * turn])
+
+
+def jacobians(chain: Chain, frames: Float[np.ndarray, "frame n 4 4"]) -> Float[np.ndarray, "n 6 joint"]:
+    """Of the tip's velocity [m/rad] and of its angular velocity times the lever [m/rad]."""
+    axes = np.einsum("fnij,fj->fni", frames[:-1, :, :3, :3], chain.axes)
+    arms = frames[-1, :, :3, 3] - frames[:-1, :, :3, 3]
+    return np.moveaxis(np.concatenate([np.cross(axes, arms), LEVER_M * axes], axis=2), 0, 2)

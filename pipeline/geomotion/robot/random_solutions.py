@@ -13,7 +13,7 @@ from geomotion.errors import InvalidSetting
 from geomotion.robot import panda
 from geomotion.robot.chain import Chain, panda_chain
 from geomotion.robot.inverse_kinematics import ORIENTATION_TOLERANCE_RAD, POSITION_TOLERANCE_M, pose_transforms
-from geomotion.robot.pose_search import DAMPING_M2, LEVER_M
+from geomotion.robot.pose_search import DAMPING_M2, LEVER_M, jacobians
 from geomotion.types import Bool, Float
 
 ITERATIONS = 50
@@ -85,27 +85,20 @@ def _search(chain: Chain, targets: Transforms, starts_rad: Joints) -> Joints:
         left, frames, error = left[is_far], frames[:, is_far], error[is_far]
         if len(left) == 0:
             break
-        joints[left] = _step(joints[left], _jacobians(chain, frames), error)
+        joints[left] = _step(joints[left], jacobians(chain, frames), error)
     return joints
 
 
-def _step(joints: Joints, jacobians: Float[np.ndarray, "n 6 joint"], error: Float[np.ndarray, "n 6"]) -> Joints:
+def _step(joints: Joints, J: Float[np.ndarray, "n 6 joint"], error: Float[np.ndarray, "n 6"]) -> Joints:
     """One damped step; joints that it would carry beyond a limit stay there, and the others make up for them."""
     lower, upper = panda.LIMITS.lower_rad, panda.LIMITS.upper_rad
     damping = (np.einsum("ni,ni->n", error, error) / 2 + DAMPING_M2)[:, None, None] * np.eye(6)
     is_free = np.ones(joints.shape, dtype=bool)
     for _ in range(2):
-        K = jacobians * is_free[:, None]
+        K = J * is_free[:, None]
         step = np.einsum("nij,ni->nj", K, np.linalg.solve(K @ K.swapaxes(1, 2) + damping, error[..., None])[..., 0])
         is_free &= (joints + step >= lower) & (joints + step <= upper)
     return np.asarray(np.clip(joints + step, lower, upper))
-
-
-def _jacobians(chain: Chain, frames: Float[np.ndarray, "frame n 4 4"]) -> Float[np.ndarray, "n 6 joint"]:
-    """Of the tip's velocity [m/rad] and of its angular velocity times the lever [m/rad]."""
-    axes = np.einsum("fnij,fj->fni", frames[:-1, :, :3, :3], chain.axes)
-    arms = frames[-1, :, :3, 3] - frames[:-1, :, :3, 3]
-    return np.moveaxis(np.concatenate([np.cross(axes, arms), LEVER_M * axes], axis=2), 0, 2)
 
 
 def _pose_error(reached: Transforms, targets: Transforms) -> Float[np.ndarray, "n 6"]:

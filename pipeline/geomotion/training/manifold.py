@@ -35,7 +35,7 @@ class PoseReconstruction:
         chosen = torch.randint(len(self.poses), (settings.batch_points,), generator=generator)
         poses, done = self.poses[chosen], self.progress[chosen]
         mean, log_variance = model.encode(poses, done)
-        z = mean + torch.randn(mean.shape, generator=generator) * (log_variance / 2).exp()
+        z = _drawn(mean, log_variance, generator)
         decoded = model.decode(z)
         position, orientation = torch.split(poses, [model.position_dim, model.orientation_dim], dim=-1)
         density = antipodal_log_density if self.antipodal is Antipodal.mixture else log_density
@@ -74,7 +74,7 @@ class SpreadLikelihood:
         poses = self.poses[chosen]
         with torch.no_grad():
             mean, log_variance = model.encode(poses, self.progress[chosen])
-            z = mean + torch.randn(mean.shape, generator=generator) * (log_variance / 2).exp()
+            z = _drawn(mean, log_variance, generator)
             decoded = model.decode(z)
         position, orientation = torch.split(poses, [model.position_dim, model.orientation_dim], dim=-1)
         precision = model.precision(z)
@@ -107,7 +107,7 @@ class JointReconstruction:
         chosen = torch.randint(len(self.joints), (settings.batch_points,), generator=generator)
         joints, done = self.joints[chosen], self.progress[chosen]
         mean, log_variance = model.encode(joints, done)
-        z = mean + torch.randn(mean.shape, generator=generator) * (log_variance / 2).exp()
+        z = _drawn(mean, log_variance, generator)
         decoded, decoded_progress = model.reconstruct(z)
         losses = {
             "joints": settings.position_weight * _squares(decoded - joints, settings.fixed_std).mean(),
@@ -142,7 +142,7 @@ class JointSpreadLikelihood:
         joints = self.joints[chosen]
         with torch.no_grad():
             mean, log_variance = model.encode(joints, self.progress[chosen])
-            z = mean + torch.randn(mean.shape, generator=generator) * (log_variance / 2).exp()
+            z = _drawn(mean, log_variance, generator)
             squares = (model.reconstruct(z)[0] - joints).square().sum(dim=-1)
         precision = model.precision(z)
         return {"std": (squares * precision.square() / 2 - joints.shape[-1] * precision.log()).mean()}
@@ -150,6 +150,13 @@ class JointSpreadLikelihood:
 
 def _squares(missed: Float[Tensor, "point D"], std: float) -> Float[Tensor, " point"]:
     return missed.square().sum(dim=-1) / (2 * std**2)
+
+
+def _drawn(
+    mean: Float[Tensor, "point d"], log_variance: Float[Tensor, "point d"], generator: torch.Generator
+) -> Float[Tensor, "point d"]:
+    """From the posterior."""
+    return mean + torch.randn(mean.shape, generator=generator) * (log_variance / 2).exp()
 
 
 def _divergence(mean: Float[Tensor, "point d"], log_variance: Float[Tensor, "point d"]) -> Float[Tensor, " point"]:
