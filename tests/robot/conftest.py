@@ -5,6 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from geomotion import arms
+from geomotion.config import PandaArm, PlanarArm
+from geomotion.robot.arm import Arm
+
+from .arms import write_crooked
+
 TASKS = ("wineglass", "bottle2shelf", "openbox", "pouring", "scoop", "matfolding")
 DEMO_S = 1000 / 60
 
@@ -37,3 +43,14 @@ def arc(count: int = 60) -> np.ndarray:
 
     s = np.linspace(0, 1, count)[:, None]
     return panda.HOME_RAD + np.sin(np.pi * s * np.array([0.5, 0.4, 0.3, 0.5, 0.7, 0.6, 1.0])) * 0.6
+
+
+@pytest.fixture(scope="module", params=["panda", "planar", "crooked"])
+def arm(request, tmp_path_factory) -> Arm:
+    """Shipped arms, and one whose axes and shapes are of all kinds."""
+    match request.param:
+        case "panda":
+            return arms.build(PandaArm())
+        case "planar":
+            return arms.build(PlanarArm())
+    return write_crooked(tmp_path_factory.mktemp("urdf")).arm()

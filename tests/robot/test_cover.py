@@ -19,16 +19,6 @@ from geomotion.robot.scene import ArmScene
 from .arms import some_joints, write_crooked
 
 
-@pytest.fixture(scope="module", params=["panda", "planar", "crooked"])
-def arm(request, tmp_path_factory) -> Arm:
-    match request.param:
-        case "panda":
-            return arms.build(PandaArm())
-        case "planar":
-            return arms.build(PlanarArm())
-    return write_crooked(tmp_path_factory.mktemp("urdf")).arm()
-
-
 def in_shapes(arm: Arm, count: int) -> BodyPoints:
     """Random points of the hulls' surfaces and insides, and their corners, as points of the arm."""
     random, frames, found = np.random.default_rng(0), [], []

@@ -12,17 +12,7 @@ from geomotion.robot.arm import Arm
 from geomotion.robot.body import BodyPoints
 from geomotion.robot.kinematics import ForwardKinematics
 
-from .arms import some_joints, write_crooked
-
-
-@pytest.fixture(scope="module", params=["panda", "planar", "crooked"])
-def arm(request, tmp_path_factory) -> Arm:
-    match request.param:
-        case "panda":
-            return arms.build(PandaArm())
-        case "planar":
-            return arms.build(PlanarArm())
-    return write_crooked(tmp_path_factory.mktemp("urdf")).arm()
+from .arms import some_joints
 
 
 def layer_of(arm: Arm, between: int = 1) -> ForwardKinematics:
