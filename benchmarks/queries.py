@@ -1,9 +1,12 @@
-"""What a control loop pays for one velocity at one state: all fields with their default settings, eager and exported.
+"""What one velocity costs a control loop, and a thousand at once a rollout: all fields, eager and exported.
 
-Run as ``python benchmarks/queries.py``. Parameters are random, which the time does not depend on. One core.
+Run as ``python benchmarks/queries.py``. Default settings; parameters are random, which the time does not depend on,
+except for dopri5, whose steps do. One core.
 """
 
 import tempfile
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +20,18 @@ from geomotion.export import OnnxPolicy, export_onnx
 from geomotion.models import ModelConfig
 from geomotion.training.data import Geometry
 
-DIMENSIONS = (2, 4, 8)
-CALLS = 1000
+DIMENSIONS = (2, 8)
+BATCHES = {1: 1000, 1000: 20}  # states at once, and timed calls
+THESIS = ModelConfig(schema.IdentityChart(), schema.LineIntegralField(), schema.ConstantRegulariser(), 0)
 
 MODELS = {
     "linear in a flow": ModelConfig(schema.FlowChart(), schema.LinearField(), schema.NoRegulariser(), 0),
     "potential in a flow": ModelConfig(schema.FlowChart(), schema.PotentialField(), schema.NoRegulariser(), 0),
-    "line integral": ModelConfig(schema.IdentityChart(), schema.LineIntegralField(), schema.ConstantRegulariser(), 0),
+    "line integral, quadrature": THESIS,
+    "line integral, rk4": replace(THESIS, field=schema.LineIntegralField(integrator=schema.Integrator.rk4)),
+    "line integral, dopri5": replace(THESIS, field=schema.LineIntegralField(integrator=schema.Integrator.dopri5)),
 }
+ADAPTIVE = {"line integral, dopri5"}  # how often they evaluate the network depends on the state: not exported
 
 
 def build(config: ModelConfig, dim: int) -> ChartedField:
@@ -39,21 +46,35 @@ def build(config: ModelConfig, dim: int) -> ChartedField:
 
 def row(name: str, field: ChartedField) -> str:
     """Times of one field, and whether both ways give the same velocity."""
-    state = torch.full((1, field.dim), 0.02)
-    array = state.numpy()
+    generator = torch.Generator().manual_seed(0)
+    states = {count: 0.02 * torch.randn(count, field.dim, generator=generator) for count in BATCHES}
+    cells = [_cell(lambda one=one: field(one), BATCHES[count]) for count, one in states.items()]
+    difference = ""
+    if name in ADAPTIVE:
+        cells += ["-"] * len(BATCHES)
+    else:
+        policy = _exported(field)
+        arrays = {count: one.numpy() for count, one in states.items()}
+        cells += [_cell(lambda one=one: policy(one), BATCHES[count]) for count, one in arrays.items()]
+        difference = f"{np.abs(policy(arrays[1000]) - field(states[1000]).numpy()).max():.1e} m/s"
+    return f"{name:<27}{field.dim:>2}" + "".join(f"{cell:>19}" for cell in cells) + f"{difference:>14}"
+
+
+def _cell(call: Callable[[], object], calls: int) -> str:
+    median, spread = measure(call, calls)
+    return f"{median:.3f} ({spread:.3f})"
+
+
+def _exported(field: ChartedField) -> OnnxPolicy:
     with tempfile.TemporaryDirectory() as folder:
         export_onnx(field, Path(folder) / "policy.onnx")
-        policy = OnnxPolicy(Path(folder) / "policy.onnx")
-    times = measure(lambda: field(state), CALLS), measure(lambda: policy(array), CALLS)
-    cells = "".join(f"{f'{median:.3f} ({spread:.3f})':>18}" for median, spread in times)
-    difference = np.abs(policy(array) - field(state).numpy()).max()
-    return f"{name:<22}{field.dim:>3}{cells}{difference:>18.1e} m/s"
+        return OnnxPolicy(Path(folder) / "policy.onnx")
 
 
 def main() -> None:
     torch.set_num_threads(1)
-    print("One velocity at one state [ms]: median (interquartile range)")
-    print(f"{'field':<22}{'D':>3}{'eager':>18}{'exported':>18}{'largest difference':>22}")
+    print("Velocities at 1 and at 1000 states [ms]: median (interquartile range); largest difference of the exported")
+    print(f"{'field':<27}{'D':>2}{'eager, 1':>19}{'eager, 1000':>19}{'exported, 1':>19}{'exported, 1000':>19}")
     for name, config in MODELS.items():
         for dim in DIMENSIONS:
             print(row(name, build(config, dim)), flush=True)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -38,3 +40,19 @@ def test_an_exported_field_gives_the_same_velocities_for_any_batch(tmp_path, nam
         states = torch.tensor(centre) + 0.05 * torch.randn(count, dim)
         with torch.no_grad():
             np.testing.assert_allclose(policy(states.numpy()), field(states).numpy(), rtol=2e-4, atol=1e-6)
+
+
+@pytest.mark.usefixtures("without_shape_checks")
+def test_an_exported_time_law_gives_the_same_velocities_at_all_times(tmp_path):
+    config = replace(CONFIGURATIONS["linear in a flow"], time_law=schema.LearnedTimeLaw(knots=5))
+    field = models.build(config, Geometry((0.1, 0.1), 0.05, (0.1, 0.1), (0.1, 0.1), 2.0))
+    with torch.no_grad():
+        field.time_law.raw_speeds.copy_(torch.linspace(-2, 2, 6))
+    export_onnx(field, tmp_path / "policy.onnx")
+    policy = OnnxPolicy(tmp_path / "policy.onnx")
+    states, elapsed_s = 0.1 + 0.05 * torch.randn(31, 2), torch.linspace(0, 5, 31)[:, None]
+    with torch.no_grad():
+        np.testing.assert_allclose(
+            policy(states.numpy(), elapsed_s.numpy()), field(states, elapsed_s), rtol=2e-4, atol=1e-6
+        )
+        assert not torch.allclose(field(states, elapsed_s), field(states), rtol=0.1)

@@ -29,6 +29,18 @@ CONFIGURATIONS = {
         schema.StateDependentRegulariser(hidden_units=[8], activation=schema.Activation.softplus),
         1,
     ),
+    "line integral, unconstrained": ModelConfig(
+        schema.IdentityChart(),
+        schema.LineIntegralField(hidden_units=[20], jacobian=schema.JacobianForm.unconstrained),
+        schema.NoRegulariser(),
+        1,
+    ),
+    "velocity network": ModelConfig(
+        schema.IdentityChart(),
+        schema.VelocityNetworkField(hidden_units=[20], activation=schema.Activation.silu),
+        schema.NoRegulariser(),
+        1,
+    ),
     "line integral, eigenvalues": ModelConfig(
         schema.IdentityChart(), schema.LineIntegralField(hidden_units=[20]), schema.EigenvalueRegulariser(), 1
     ),
@@ -88,6 +100,25 @@ def test_parts_that_do_not_go_together_are_refused():
         models.build(
             ModelConfig(schema.IdentityChart(), schema.LineIntegralField(), schema.NoRegulariser(), 0), GEOMETRY
         )
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        schema.VelocityNetworkField(hidden_units=[4]),
+        schema.LineIntegralField(hidden_units=[4], jacobian=schema.JacobianForm.unconstrained),
+    ],
+    ids=["network", "unconstrained"],
+)
+def test_a_field_without_a_negative_definite_matrix_has_no_regulariser(field):
+    with pytest.raises(InvalidSetting, match="no negative definite matrix"):
+        models.build(ModelConfig(schema.IdentityChart(), field, schema.ConstantRegulariser(), 0), GEOMETRY)
+
+
+def test_an_unconstrained_matrix_needs_no_skew_part():
+    field = schema.LineIntegralField(hidden_units=[4], jacobian=schema.JacobianForm.unconstrained, skew=True)
+    with pytest.raises(InvalidSetting, match=r"field\.skew"):
+        models.build(ModelConfig(schema.IdentityChart(), field, schema.NoRegulariser(), 0), GEOMETRY)
 
 
 def test_a_skew_part_needs_two_coordinates():

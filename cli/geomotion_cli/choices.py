@@ -32,10 +32,16 @@ def program_options(program: str) -> dict[str, list[str]]:
 
 def group_options(*groups: str) -> dict[str, list[str]]:
     """Every option of each group, as it is written after ``group=``; a group without options is left out."""
-    with initialize_config_module(version_base="1.3", config_module="geomotion.conf"):
-        sources = GlobalHydra.instance().config_loader().get_sources()
+    sources = _sources()
     options = {group: sorted(set(_options_below(sources, group))) for group in groups}
     return {group: found for group, found in options.items() if found}
+
+
+def _sources() -> list[ConfigSource]:
+    if GlobalHydra.instance().is_initialized():  # a command is at work
+        return list(GlobalHydra.instance().config_loader().get_sources())
+    with initialize_config_module(version_base="1.3", config_module="geomotion.conf"):
+        return list(GlobalHydra.instance().config_loader().get_sources())
 
 
 def _options_below(sources: list[ConfigSource], group: str, prefix: str = "") -> Iterator[str]:

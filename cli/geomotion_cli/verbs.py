@@ -28,6 +28,7 @@ _MODEL = {
     "field=linear": "contracting by construction, in the coordinates of a learned flow",
     "field=potential": "the same with a nonlinear time law",
     "field=line_integral": "the thesis' field, contraction measured only",
+    "field=mlp": "or neural_ode: networks without any promise, for comparison",
 }
 _TRAINING = {
     "training.steps=4000": "optimiser steps",
@@ -150,11 +151,19 @@ PROGRAMS = {
         {
             "run": Verb(
                 "the whole chain: ingest, train, rollout, eval, report",
-                {**_DATASET, **_MODEL, "experiment=thesis/ncds": "the thesis' own settings", **_TRAINING, **_JSON},
+                {
+                    **_DATASET,
+                    **_MODEL,
+                    "experiment=thesis/ncds": "the thesis' own settings",
+                    "experiment=thesis/table_5_1": "a study: many runs, one table; also table_5_2, fig_5_10, …",
+                    **_TRAINING,
+                    **_JSON,
+                },
                 (
                     "dataset=lasa/angle",
                     "dataset=lasa/angle field=line_integral",
                     "-m dataset=letters/c,letters/s seed=0,1",
+                    "experiment=thesis/table_5_1 study.jobs=2",
                 ),
             ),
             "ingest": _INGEST,

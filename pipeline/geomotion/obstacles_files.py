@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from geomotion.errors import DatasetError, InvalidSetting, MissingData
@@ -65,6 +65,21 @@ def load_mesh(path: Path, placement: Placement = AS_IT_IS, cells: int = 64) -> M
         InvalidSetting: If its suffix names another format.
         DatasetError: If it cannot be read, has no faces, or a vertex is not finite.
     """
+    vertices, faces = load_triangles(path)
+    mesh = Mesh(placement.apply(vertices), faces, cells=cells)
+    if not mesh.is_watertight:
+        _warn_of_holes(path, mesh, open_edges(faces))
+    return mesh
+
+
+def load_triangles(path: Path) -> tuple[Points, Int[np.ndarray, "face 3"]]:
+    """Vertices and faces of an .obj, .stl or .ply file, as they are there but for corners that are repeated.
+
+    Raises:
+        MissingData: If there is no such file.
+        InvalidSetting: If its suffix names another format.
+        DatasetError: If it cannot be read, has no faces, or a vertex is not finite.
+    """
     _require_file(path, "mesh", MESH_SUFFIXES)
     loaded = _with_trimesh(path, force="mesh")
     faces = np.asarray(getattr(loaded, "faces", np.zeros((0, 3))), dtype=np.int64)
@@ -73,10 +88,7 @@ def load_mesh(path: Path, placement: Placement = AS_IT_IS, cells: int = 64) -> M
     vertices = _finite(path, np.asarray(loaded.vertices, dtype=np.float64))
     vertices, merged = np.unique(vertices, axis=0, return_inverse=True)  # STL repeats corners, OBJ seams of textures
     faces = merged[faces]
-    mesh = Mesh(placement.apply(vertices), faces[_is_triangle(faces)], cells=cells)
-    if not mesh.is_watertight:
-        _warn_of_holes(path, mesh, open_edges(faces[_is_triangle(faces)]))
-    return mesh
+    return vertices, faces[_is_triangle(faces)]
 
 
 def load_point_cloud(path: Path, radius_m: float, placement: Placement = AS_IT_IS) -> PointCloud:

@@ -41,7 +41,7 @@ def test_settings_of_a_verb(offered):
 
 
 def test_choices_of_a_group_with_sub_folders_and_earlier_values_of_a_sweep(offered):
-    assert offered("ncds train dataset=lasa/ang") == ["dataset=lasa/angle"]
+    assert offered("ncds train dataset=lasa/spo") == ["dataset=lasa/spoon"]
     assert offered("ncds train field=linea") == ["field=linear"]
     assert "dataset=lasa/angle,letters/c" in offered("ncds train -m dataset=lasa/angle,let")
     assert offered("ncds train experiment=th") == ["experiment=thesis/ncds"]
@@ -80,10 +80,10 @@ def test_bash_completes_verbs_settings_and_choices():
     complete -p ncds
     try "ncds tra" 1
     try "ncds train chart.la" 2
-    try "ncds train dataset=lasa/ang" 2
+    try "ncds train dataset=lasa/spo" 2
     """
     environment = {**os.environ, "PATH": f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"}
     done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=True)
     registered, *completions = done.stdout.splitlines()
     assert registered.endswith("-F hydra_bash_completion ncds")
-    assert completions == ["train", "chart.layers=", "dataset=lasa/angle"]
+    assert completions == ["train", "chart.layers=", "dataset=lasa/spoon"]

@@ -25,6 +25,7 @@ NEEDED = {  # what has no default
     "obstacle=sphere": ["obstacle.centre_m=[0,0]", "obstacle.radius_m=1"],
     "obstacle=ellipsoid": ["obstacle.centre_m=[0,0]", "obstacle.semi_axes_m=[1,2]"],
     "obstacle=box": ["obstacle.centre_m=[0,0]", "obstacle.sides_m=[1,2]"],
+    "obstacle=polygon": ["obstacle.centre_m=[0,0]", "obstacle.vertices_m=[[0,0],[1,0],[0,1]]"],
     "obstacle=mesh": ["obstacle.file=duck.obj"],
     "obstacle=point_cloud": ["obstacle.file=scan.npy"],
     "obstacle=several": ["obstacle.bodies=[{shape:sphere,centre_m:[0,0],radius_m:1}]"],

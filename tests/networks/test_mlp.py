@@ -13,7 +13,9 @@ def test_one_hidden_layer_is_the_formula(activation):
     torch.manual_seed(0)
     network = MLP(3, 2, [7], activation).double()
     x = torch.randn(5, 3, dtype=torch.float64)
-    function = {"tanh": torch.tanh, "softplus": torch.nn.functional.softplus, "sigmoid": torch.sigmoid}[activation]
+    smooth = {"softplus": lambda y: (1 + y.exp()).log(), "silu": lambda y: y * torch.sigmoid(y)}
+    kinked = {"relu": lambda y: y.clamp(min=0), "elu": lambda y: torch.where(y > 0, y, y.exp() - 1)}
+    function = {"tanh": torch.tanh, "sigmoid": torch.sigmoid, **smooth, **kinked}[activation]
     first, last = network[0], network[2]
     assert_close(network(x), function(x @ first.weight.T + first.bias) @ last.weight.T + last.bias)
 

@@ -5,7 +5,6 @@ import torch
 from torch import nn
 from torch.testing import assert_close
 
-from geomotion.dynamics.fields import VectorField
 from geomotion.dynamics.rollout import RolloutStatus
 from geomotion.errors import InvalidSetting, ShapeMismatch
 from geomotion.obstacles.modulation import ModulatedField, modulation_matrix
@@ -14,8 +13,7 @@ from geomotion.obstacles.rollout import rollout_among_obstacles
 from geomotion.obstacles.solids import Box, Ellipsoid, Sphere, unit
 
 ANGLE = torch.tensor(0.5).double()
-STARTS = 300
-PENETRATION = 1e-6  # of metre-sized scenes: what RK4 steps of 20 ms miss; a continuous trajectory misses nothing
+ROUNDING = 1e-12  # of scenes of a metre
 
 
 class Linear(nn.Module):
@@ -91,25 +89,32 @@ def test_the_matrix_has_the_eigenvectors_and_eigenvalues_of_the_thesis(kind, dim
 
 @pytest.mark.parametrize(("kind", "dim"), OBSTACLES)
 @pytest.mark.parametrize("escape", [True, False])
-def test_nothing_crosses_a_surface(kind, dim, escape):
+def test_nothing_crosses_a_surface_inwards(kind, dim, escape):
     velocity = torch.tensor([0.3, -0.7, 0.2]).double()[:dim]
     for moving in (None, velocity):
         obstacle = make(kind, dim, velocity=moving)
-        x = surface_points(obstacle, directions(dim))
-        field = ModulatedField(Random(dim), [obstacle], escape=escape)
-        relative = field(x) - obstacle.velocity
-        outward = normal_speed(obstacle, x, relative)
-        speed = field.field(x).norm(dim=-1)
-        # where rounding puts a point inside, it is pushed out, never drawn in
-        assert (outward > -1e-12 * speed).all()
-        just_outside = obstacle.reference + (1 + 1e-9) * (x - obstacle.reference)
-        crossing = normal_speed(obstacle, just_outside, field(just_outside) - obstacle.velocity)
-        assert (crossing.abs() < 1e-7 * (1 + speed)).all()
+        surface = surface_points(obstacle, directions(dim))
+        just_outside = obstacle.reference + (1 + 1e-9) * (surface - obstacle.reference)
+        for hold in (True, False):
+            field = ModulatedField(Random(dim), [obstacle], escape=escape, hold=hold)
+            wanted = normal_speed(obstacle, just_outside, field.field(just_outside) - obstacle.velocity)
+            found = normal_speed(obstacle, just_outside, field(just_outside) - obstacle.velocity)
+            leaves = (wanted > 0) & (not hold)
+            assert_close(found, torch.where(leaves, wanted, 0.0), atol=1e-7, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("kind", "dim"), OBSTACLES)
+def test_velocities_are_continuous_across_the_surface(kind, dim):
+    obstacle = make(kind, dim)
+    field = ModulatedField(Random(dim), [obstacle])
+    surface = surface_points(obstacle, directions(dim)) - obstacle.reference
+    inside, outside = (field(obstacle.reference + share * surface) for share in (1 - 1e-9, 1 + 1e-9))
+    assert_close(inside, outside, atol=1e-6, rtol=0)
 
 
 def test_at_the_surface_of_one_of_several_only_this_one_counts():
     obstacles = [make("sphere", 2), make("box", 2, centre=2.0), make("ellipsoid", 2, centre=-1.0)]
-    field = ModulatedField(Random(2), obstacles)
+    field = ModulatedField(Random(2), obstacles, hold=True)
     for obstacle in obstacles:
         surface = surface_points(obstacle, directions(2))
         x = obstacle.reference + (1 + 1e-9) * (surface - obstacle.reference)
@@ -133,52 +138,14 @@ def test_a_start_inside_is_driven_out(kind, dim):
     surface = surface_points(obstacle, directions(dim, 50))
     starts = torch.cat([obstacle.reference[None], obstacle.reference + 0.6 * (surface - obstacle.reference)])
     assert (normal_speed(obstacle, starts[1:], field(starts[1:])) > 0).all()
-    end = rollout_among_obstacles(field, starts, torch.linspace(0, 1, 101).double()).states[:, -1]
-    assert (obstacle.signed_distance(end) > -PENETRATION).all()
-
-
-def scene(*obstacles: Obstacle) -> tuple[Obstacle, ...]:
-    return obstacles
-
-
-SCENES = {
-    "sphere": scene(make("sphere", 2)),
-    "ellipsoid": scene(make("ellipsoid", 2)),
-    "box": scene(make("box", 2)),
-    "two": scene(make("sphere", 2), make("box", 2, centre=-1.0)),
-    "box in space": scene(make("box", 3)),
-}
-
-
-def starts_around(obstacles: tuple[Obstacle, ...]) -> torch.Tensor:
-    """Random states around the obstacles, none inside; some exactly behind the first one, on the line to the goal."""
-    dim = obstacles[0].dim
-    generator = torch.Generator().manual_seed(0)
-    starts = 4 * torch.rand(4 * STARTS, dim, generator=generator).double() - 2
-    starts[:5] = torch.linspace(1.7, 2.0, 5).double()[:, None] * unit(obstacles[0].reference)
-    is_free = torch.stack([obstacle.signed_distance(starts) > 0 for obstacle in obstacles]).all(dim=0)
-    return starts[is_free][:STARTS]
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_random_starts_reach_the_goal_and_none_penetrates(name):
-    obstacles = SCENES[name]
-    times = torch.linspace(0, 10, 501).double()
-    field: VectorField = Linear(obstacles[0].dim, turn=0.3)
-    starts = starts_around(obstacles)
-    assert len(starts) == STARTS
-    found = rollout_among_obstacles(
-        ModulatedField(field, obstacles), starts, times, goal=torch.zeros(field.dim).double(), goal_tolerance=0.02
-    )
-    assert (clearance(obstacles, found.states, times) > -PENETRATION).all()
-    reached = [status is RolloutStatus.reached for status in found.statuses]
-    assert sum(reached) >= 0.99 * STARTS
+    end = rollout_among_obstacles(field, starts, torch.linspace(0, 2, 41).double()).states[:, -1]
+    assert (obstacle.signed_distance(end) > -1e-6).all()
 
 
 def test_the_escape_field_frees_starts_that_head_straight_for_the_middle():
     obstacle = make("sphere", 2)
     starts = torch.tensor([[1.8, 0.0], [2.5, 0.0]]).double()
-    times = torch.linspace(0, 15, 501).double()
+    times = torch.linspace(0, 15, 61).double()
     ends = {}
     for escape in (True, False):
         field = ModulatedField(Linear(2), [obstacle], escape=escape)
@@ -190,12 +157,11 @@ def test_the_escape_field_frees_starts_that_head_straight_for_the_middle():
 
 def test_a_moving_sphere_pushes_a_resting_state_aside_and_lets_it_return():
     sphere = Sphere(torch.tensor([2.0, 0.05]).double(), 0.3, torch.tensor([-1.0, 0.0]).double())
-    times = torch.linspace(0, 8, 801).double()
+    times = torch.linspace(0, 8, 161).double()
     field = ModulatedField(Linear(2), [sphere])
-    starts = torch.cat([torch.zeros(1, 2).double(), starts_around(SCENES["sphere"])[5:50]])
-    starts = starts[sphere.signed_distance(starts) > 0]
+    starts = torch.zeros(1, 2).double()
     found = rollout_among_obstacles(field, starts, times, goal=torch.zeros(2).double(), goal_tolerance=0.05)
-    assert (clearance([sphere], found.states, times) > -PENETRATION).all()
+    assert clearance([sphere], found.states, times).min() > -ROUNDING
     assert found.states[0].norm(dim=-1).max() > 0.2  # it had to give way
     assert set(found.statuses) == {RolloutStatus.reached}
 
@@ -210,7 +176,7 @@ def test_fields_are_differentiable_also_where_obstacles_bring_them_to_rest():
 def test_closed_forms_are_not_offered_and_misfits_are_refused():
     field = ModulatedField(Linear(2), [make("sphere", 2)])
     times = torch.linspace(0, 1, 5).double()
-    assert rollout_among_obstacles(field, torch.full((1, 2), 3.0).double(), times).method == "rk4"
+    assert rollout_among_obstacles(field, torch.full((1, 2), 3.0).double(), times).method == "dopri5"
     with pytest.raises(InvalidSetting, match="closed form"):
         rollout_among_obstacles(field, torch.full((1, 2), 3.0).double(), times, method="closed_form")
     with pytest.raises(ShapeMismatch, match="coordinates of an obstacle"):

@@ -179,6 +179,21 @@ def run(tmp_path: Path) -> StageRun:
     return StageRun(folder, tmp_path / "checkpoint", client=None, run_id="2")
 
 
+def test_among_obstacles_contraction_is_measured_and_the_claim_stays_that_of_free_space(inputs, run):
+    ball = schema.SphereObstacle(centre_m=[0.07, 0.08], radius_m=0.015, escape=False)
+    evaluate(EvaluateConfig(SETTINGS, SOLVER, ball), inputs, run)
+    certificate = read_json(run.folder / "certificate.json")
+    measured = certificate["obstacles"]["measured"]
+    assert certificate["claim"] == "by_construction"
+    assert "not proven" in certificate["obstacles"]["statement"]
+    assert measured["obstacles.contraction.claimed.rate"] > -certificate["rate_per_s"]
+    assert 0 <= measured["obstacles.contraction.true.non_contracting_fraction"] <= 1
+    assert measured["obstacles.passage.clearance"] > -1e-3  # mm, in single precision
+    assert measured["obstacles.nearby.claimed.max_expansion"] >= 1
+    scores = read_json(run.folder / "scores.json")["scores"]
+    assert scores["obstacles.passage.never_reached"]["count"] <= 9
+
+
 def test_the_stage_writes_what_it_computed(inputs, run, scores):
     evaluate(EvaluateConfig(SETTINGS, SOLVER), inputs, run)
     document = read_json(run.folder / "scores.json")

@@ -192,6 +192,17 @@ def test_verdict_of_a_measured_field_promises_nothing(stages, tmp_path):
     assert "by construction" not in text.partition("What was learned")[0]
 
 
+def test_verdict_of_a_verified_box_says_where_it_ends(stages, tmp_path):
+    shares = {f"verification.{name}": value for name, value in (("contracting", 1.0), ("not_contracting", 0.0))}
+    changes = {"claim": "verified_on_set", "overshoot": {"median": 1.0, "worst": 1.0, "bound": 1.0}, "audit": shares}
+    text = text_of(page_of(stages(certificate=BY_CONSTRUCTION | changes), tmp_path))
+    assert "as long as both stay inside a box" in text
+    assert "halves at least every 0.87 s" in text
+    assert "Outside the box nothing is proven" in text
+    assert "metric that was learned" not in text
+    assert "contracting 100%, not contracting 0%" in text
+
+
 def test_verdict_says_when_the_measurement_contradicts_the_claim(stages, tmp_path):
     page = page_of(stages(evaluation=arrays() | {"claimed_eigenvalue": np.full(16, 0.1)}), tmp_path)
     assert 'class="verdict contradicted"' in page

@@ -27,7 +27,8 @@ IN_THE_WAY = schema.SphereObstacle(centre_m=[0.05, 0.0], radius_m=0.015)
 @pytest.fixture
 def inputs(tmp_path: Path) -> dict[str, Artefacts]:
     """A field that runs straight to the goal, as if learned from two straight demonstrations."""
-    config = ModelConfig(schema.IdentityChart(), schema.LinearField(), schema.NoRegulariser(), seed=0)
+    slow = schema.LinearField(min_rate_per_duration=0.1, initial_rate_per_duration=2.0)
+    config = ModelConfig(schema.IdentityChart(), slow, schema.NoRegulariser(), seed=0)
     geometry = Geometry(centre=(0.05, 0.0), scale_m=0.05, mean=(0.05, 0.0), goal=GOAL, duration_s=1.0)
     skill = Skill(models.build(config, geometry).eval(), config, geometry, ("position_m",), (0, 1), ())
     time_s = np.linspace(0, 1, 30)
@@ -72,17 +73,17 @@ def test_rollouts_go_around_obstacles_to_the_goal(inputs, run, obstacle):
     document = read_json(run.folder / "rollouts.json")
     for row in document["rollouts"]:
         assert row["reached_goal"]
-        assert row["method"] == "rk4"
-        assert -1e-6 < row["clearance_m"] < 0.05
+        assert row["method"] == "dopri5"
+        assert -1e-9 < row["clearance_m"] < 0.05
     assert "clearance" in rollout_table(document)
     with np.load(run.folder / "figures" / "rollouts.npz", allow_pickle=False) as arrays:
-        assert {"demo_1", "rollout_1", "obstacle_0", "obstacle_at_end_0", "goal"} <= set(arrays.files)
+        assert {"demo_1", "rollout_1", "obstacle_0", "obstacle_at_end_0", "goals"} <= set(arrays.files)
     for suffix in ("png", "pdf"):
         assert (run.folder / "figures" / f"rollouts.{suffix}").stat().st_size > 1000
     velocities = storage.load(run.folder / "rollouts")[0].channels["velocity_m_per_s"]
     states = storage.load(run.folder / "rollouts")[0].channels["position_m"]
     np.testing.assert_allclose(
-        np.diff(states, axis=0)[5:] * 199 / 4, (velocities[1:] + velocities[:-1])[5:] / 2, atol=0.01
+        np.diff(states, axis=0)[5:] * 199 / 4, (velocities[1:] + velocities[:-1])[5:] / 2, atol=0.03
     )
 
 
@@ -132,7 +133,7 @@ def test_the_verb_takes_an_obstacle_beside_a_trained_run(fresh_store):
             typed = [*overrides, f"tracking.root={fresh_store}"]
             result = run_verb(verb, OmegaConf.to_object(compose("ncds", overrides=typed)), typed)
     (row,) = result.document["rollouts"]["rollouts"]
-    assert row["method"] == "rk4"
+    assert row["method"] == "dopri5"
     assert 0.1 < row["clearance_m"] < 1.5
     assert "clearance" in result.text
 

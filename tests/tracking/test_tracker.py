@@ -185,6 +185,18 @@ class TestLineage:
         for run in runs:
             assert tracker.lineage(run.info.run_id) == {"ingest": first}
 
+    def test_a_command_inside_another_keeps_its_own_settings(self, config):
+        tracker = Tracker(config)
+        with (
+            tracker.command("ncds run", {}, ["study"]) as outer,
+            tracker.command("ncds eval", {}, ["cell"], outer) as inner,
+        ):
+            stage = tracker.run_stage(Stage("train", Counting()), {}, {}, inner)
+        assert [tracker.overrides(run) for run in (outer.run_id, inner.run_id, stage.run_id)] == [
+            ["study"], ["cell"], ["cell"],
+        ]  # fmt: skip
+        assert tracker.client.get_run(inner.run_id).data.tags["mlflow.parentRunId"] == outer.run_id
+
     def test_missing_runs_are_reported(self, config):
         tracker = Tracker(config)
         with pytest.raises(MissingRun, match="no finished training"):

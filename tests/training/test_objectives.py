@@ -13,7 +13,7 @@ from geomotion.dynamics.regularisers import ConstantRegulariser
 from geomotion.models import ModelConfig, build
 from geomotion.networks.mlp import JacobianRoot, SkewMatrix
 from geomotion.training.data import Geometry, TrainingSet
-from geomotion.training.objectives import VelocityReconstruction, curl_penalty
+from geomotion.training.objectives import VelocityReconstruction, contraction_penalty, curl_penalty
 
 BOX_LOWER, BOX_UPPER = torch.tensor([-0.1, 0.0]), torch.tensor([0.1, 0.05])
 
@@ -76,6 +76,27 @@ def test_the_penalty_is_the_mean_squared_distance_of_the_two_jacobians_and_train
     assert all(weight.grad.abs().max() > 0 for weight in weights)
 
 
+@pytest.mark.parametrize("reserve", [0.3, 1.0])
+def test_missing_contraction_is_what_the_eigenvalues_exceed_and_training_against_it_removes_it(reserve):
+    torch.manual_seed(0)
+    root = JacobianRoot(2, [16, 16])
+    with torch.no_grad():
+        root.network[0].weight.mul_(4)
+    field, x = field_of(root, 2), states(40, 2)
+    jacobian = vmap(jacrev(field))(x)
+    eigenvalues = torch.linalg.eigvalsh((jacobian + jacobian.mT) / 2)[:, -1]
+    missing = contraction_penalty(field, x, reserve)
+    assert_close(missing, (eigenvalues + reserve).clamp(min=0).square().mean())
+    assert missing > 1e-4
+
+    optimiser = torch.optim.Adam(field.parameters(), lr=1e-2)
+    for _ in range(40):
+        optimiser.zero_grad()
+        contraction_penalty(field, x, reserve).backward()
+        optimiser.step()
+    assert contraction_penalty(field, x, reserve) < 0.1 * missing
+
+
 # ---------------------------------------------------------------- the objective
 @pytest.fixture
 def data() -> TrainingSet:
@@ -103,6 +124,10 @@ def test_without_weight_there_is_no_penalty_and_with_it_the_other_terms_stay(dat
     assert_close({name: with_penalty[name] for name in without}, without)
     assert_close(doubled["curl"], 2 * with_penalty["curl"])
     assert with_penalty["curl"] > 0
+    both = losses_of(data, VANILLA, curl_weight=2.0, contraction_weight=3.0, contraction_reserve_per_duration=9.0)
+    assert set(both) == {"velocity", "regulariser", "curl", "contraction"}
+    assert_close({name: both[name] for name in with_penalty}, with_penalty)
+    assert both["contraction"] > 0
 
 
 @pytest.mark.parametrize(

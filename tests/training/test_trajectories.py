@@ -1,7 +1,9 @@
+from dataclasses import replace
+
 import pytest
 import torch
 
-from geomotion.config import FlowChart, LinearField, NoRegulariser, TrajectoryTraining
+from geomotion.config import FlowChart, LearnedTimeLaw, LinearField, NoRegulariser, NoTimeLaw, TrajectoryTraining
 from geomotion.models import ModelConfig, build
 from geomotion.training.data import Geometry, TrainingSet
 from geomotion.training.trajectories import TrajectoryReproduction, nearest_curves, squared_distance_to_curve
@@ -24,8 +26,10 @@ def spirals() -> TrainingSet:
 @pytest.fixture
 def objective_and_model(spirals):
     geometry = Geometry.of(spirals)
-    model = build(ModelConfig(FlowChart(layers=2, features=8), LinearField(), NoRegulariser(), 0), geometry).train()
-    return TrajectoryReproduction(spirals, geometry, TrajectoryTraining(mixing=0.0)), model, geometry
+    field = LinearField(min_rate_per_duration=0.1, initial_rate_per_duration=2.0)
+    model = build(ModelConfig(FlowChart(layers=2, features=8), field, NoRegulariser(), 0), geometry).train()
+    settings = TrajectoryTraining(mixing=0.0, start_noise=0.0, velocity_weight=1.0)
+    return TrajectoryReproduction(spirals, geometry, settings), model, geometry
 
 
 def generator() -> torch.Generator:
@@ -42,15 +46,17 @@ def test_the_true_system_has_almost_no_loss(objective_and_model):
         model.field.skew_root.copy_(torch.triu(skew))
         model.chart.anchor.zero_()
         after = objective(model, 0.9, generator())
-    assert float(after["velocity"]) < 1e-5 * 0.1
+    assert float(after["velocity"]) < 1e-5
+    assert float(after["end"]) < 1e-4
     assert float(after["equal_time"]) < 1e-5
     assert float(after["nearest_point"]) < 0.02 * before
 
 
 def test_the_nearest_point_term_begins_after_the_warm_up(objective_and_model):
     objective, model, _ = objective_and_model
-    assert set(objective(model, 0.39, generator())) == {"velocity", "weights", "equal_time"}
-    assert set(objective(model, 0.41, generator())) == {"velocity", "weights", "equal_time", "nearest_point"}
+    terms = {"velocity", "haste", "weights", "end", "equal_time"}
+    assert set(objective(model, 0.39, generator())) == terms
+    assert set(objective(model, 0.41, generator())) == terms | {"nearest_point"}
 
 
 def test_the_same_generator_gives_the_same_losses(objective_and_model):
@@ -89,8 +95,26 @@ def test_only_speeds_above_the_demonstrated_ones_count_as_haste(objective_and_mo
     assert float(objective._haste(3 * slow)) > 0.1
 
 
-def test_haste_is_part_of_the_loss_where_it_has_a_weight(spirals):
+def test_a_time_law_changes_when_states_are_reached_and_how_fast_but_not_which(spirals):
+    geometry = Geometry.of(spirals)
+    settings = TrajectoryTraining(start_noise=0.0, mixing=0.0)
+    plain = ModelConfig(FlowChart(layers=2), LinearField(), NoRegulariser(), 0)
+    autonomous, timed = (build(replace(plain, time_law=law), geometry) for law in (NoTimeLaw(), LearnedTimeLaw()))
+    with torch.no_grad():
+        timed.time_law.raw_speeds.copy_(torch.linspace(-1, 1, len(timed.time_law.raw_speeds)))
+    times_s = torch.linspace(0, 2 * geometry.duration_s, 9)
+    start = spirals.states[0][:1]
+    progress_s = timed.time_law.progress(times_s / geometry.duration_s) * geometry.duration_s
+    torch.testing.assert_close(timed.solve(start, times_s), autonomous.solve(start, progress_s))
+    objective = TrajectoryReproduction(spirals, geometry, settings)
+    losses = objective(timed.train(), 0.9, generator())
+    assert losses["velocity"] != objective(autonomous.train(), 0.9, generator())["velocity"]
+    sum(losses.values()).backward()
+    assert timed.time_law.raw_speeds.grad.abs().sum() > 0
+
+
+def test_haste_costs_nothing_where_it_has_no_weight(spirals):
     geometry = Geometry.of(spirals)
     model = build(ModelConfig(FlowChart(layers=2), LinearField(), NoRegulariser(), 0), geometry).train()
-    losses = TrajectoryReproduction(spirals, geometry, TrajectoryTraining(haste_weight=0.05))(model, 0.0, generator())
-    assert set(losses) == {"velocity", "haste", "weights", "equal_time"}
+    losses = TrajectoryReproduction(spirals, geometry, TrajectoryTraining(haste_weight=0.0))(model, 0.0, generator())
+    assert "haste" not in losses

@@ -16,12 +16,15 @@ ALL_COLUMNS = (
     *TIME_COLUMNS, *DEMO_COLUMNS, "x", "y", "z", "x_mm", "y_mm", "z_mm", "position_m_x", "position_m_y", "position_m_z",
     "orientation_w", "orientation_x", "orientation_y", "orientation_z", "direction_x", "direction_y", "direction_z",
     "joint_1_rad", "joint_1_deg", "joint_1_rad_per_s", "panda_joint1", "q1",
-    "velocity_m_per_s_x", "velocity_m_per_s_y", "velocity_m_per_s_z",
+    "velocity_m_per_s_x", "velocity_m_per_s_y", "velocity_m_per_s_z", "condition_target_x_m",
 )  # fmt: skip
 
 _JOINT = r"(?:\w+_)?joint(?:_?[a-z]?\d+)?"  # as URDFs call them: panda_joint1, shoulder_pan_joint, joint_a1
 
+CONDITION = "condition"  # a column, or an array, that is constant within a demonstration
+
 _PATTERNS = (
+    (CONDITION, re.compile(r"condition_(?P<axis>\w+)")),
     ("position_m", re.compile(r"position_(?P<unit>m|cm|mm)_(?P<axis>[xyz]|\d+)")),
     ("position_m", re.compile(r"(?P<axis>[xyz])(?:_(?P<unit>m|cm|mm))?")),
     ("velocity_m_per_s", re.compile(r"velocity_(?P<unit>m|cm|mm)_per_s_(?P<axis>[xyz]|\d+)")),

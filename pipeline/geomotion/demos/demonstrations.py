@@ -36,11 +36,13 @@ class Trajectory:
         channels: Name → values, each of shape (time, axes); the unit is part of the name
             (:data:`CHANNEL_UNITS`). Quaternions are scalar-first; they and directions have unit length.
         label: Name of the demonstration or its condition.
+        condition: What the motion depends on beside the state, such as an object's place; the same throughout.
     """
 
     time_s: Array
     channels: Mapping[str, Array]
     label: str = ""
+    condition: tuple[float, ...] = ()
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -83,6 +85,7 @@ class Demonstrations:
         licence: Licence of the recordings.
         steps: Preprocessing steps, one sentence each, in order.
         joint_names: Names of the axes of ``joints_rad``; empty where they are not known.
+        condition_names: Names of the entries of conditions; empty where motions depend on the state alone.
     """
 
     name: str
@@ -93,9 +96,11 @@ class Demonstrations:
     licence: str = ""
     steps: tuple[str, ...] = field(default=())
     joint_names: tuple[str, ...] = field(default=())
+    condition_names: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
         validate(self.name, self.trajectories)
+        _validate_conditions(self.name, self.trajectories, self.condition_names)
         joints = self.trajectories[0].channels.get("joints_rad")
         if self.joint_names and (joints is None or joints.shape[1] != len(self.joint_names)):
             found = "no joints" if joints is None else f"{joints.shape[1]} joints"
@@ -122,6 +127,7 @@ class Demonstrations:
             "licence": self.licence,
             "steps": list(self.steps),
             "joint_names": list(self.joint_names),
+            "condition_names": list(self.condition_names),
             "channels": {name: values.shape[1] for name, values in self.trajectories[0].channels.items()},
         }
 
@@ -175,6 +181,14 @@ def validate(name: str, trajectories: Sequence[Trajectory]) -> None:
                 )
             if channel in UNIT_AXES:
                 _validate_unit(name, place, values, channel)
+
+
+def _validate_conditions(name: str, trajectories: Sequence[Trajectory], names: tuple[str, ...]) -> None:
+    for number, trajectory in enumerate(trajectories):
+        found = trajectory.condition
+        if len(found) != len(names) or not np.isfinite(found).all():
+            expected = f"{len(names)} finite numbers ({', '.join(names)})" if names else "none"
+            raise DatasetError(name, f"demonstration {number} has the condition {list(found)}; expected {expected}")
 
 
 def _validate_unit(name: str, place: str, values: Array, channel: str) -> None:

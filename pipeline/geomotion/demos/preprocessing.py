@@ -191,15 +191,20 @@ def _align_ends(demonstrations: Demonstrations, config: PreprocessConfig) -> Dem
     names = list(_velocity_channels(demonstrations))
     if not config.align_end or not names:
         return demonstrations
-    mean_end = np.mean([trajectory.state(names)[-1] for trajectory in demonstrations.trajectories], axis=0)
+    ends: dict[tuple[float, ...], list[Array]] = {}
+    for trajectory in demonstrations.trajectories:
+        ends.setdefault(trajectory.condition, []).append(trajectory.state(names)[-1])
     widths = [demonstrations[0].channels[name].shape[1] for name in names]
 
     def align(trajectory: Trajectory) -> Trajectory:
         values = trajectory.state(names)
+        mean_end = np.mean(ends[trajectory.condition], axis=0)
         shifted = np.split(values + (mean_end - values[-1]), np.cumsum(widths)[:-1], axis=1)
         return _with_channels(trajectory, dict(zip(names, shifted, strict=True)))
 
-    return _map(demonstrations, align, f"shifted {', '.join(names)} of every demonstration to their mean end point")
+    of_condition = " of the same condition" if demonstrations.condition_names else ""
+    step = f"shifted {', '.join(names)} of every demonstration to the mean end point{of_condition}"
+    return _map(demonstrations, align, step)
 
 
 def _scale(demonstrations: Demonstrations, config: PreprocessConfig) -> Demonstrations:

@@ -1,5 +1,6 @@
 """Which demonstrations and channels an experiment uses."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from geomotion.config import DatasetConfig
@@ -13,13 +14,14 @@ HELD_OUT = 2  # by default, where at least two remain to train on
 def split(config: DatasetConfig, demonstrations: Demonstrations) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Numbers of the demonstrations to train on and of those held out.
 
+    Where conditions are repeated, as many of each are held out as would be of a set without conditions.
+
     Raises:
         InvalidSetting: If a number does not exist, is given twice, is on both sides, or nothing is left to train on.
     """
     count = len(demonstrations)
     held_out = HELD_OUT if config.held_out is None else config.held_out
-    held_out = held_out if count >= 2 * held_out else 0
-    train = range(count - held_out) if config.train_demos is None else config.train_demos
+    train = _all_but_last(demonstrations, held_out) if config.train_demos is None else config.train_demos
     _check("dataset.train_demos", train, count)
     if not train:
         raise InvalidSetting("dataset.train_demos", [], f"at least one of the demonstrations 0 to {count - 1}")
@@ -50,6 +52,17 @@ def state_channels(config: DatasetConfig, demonstrations: Demonstrations) -> tup
         if name not in VELOCITY_OF:
             raise InvalidSetting("dataset.state_channels", name, f"channels with a velocity: {', '.join(VELOCITY_OF)}")
     return tuple(chosen)
+
+
+def _all_but_last(demonstrations: Demonstrations, held_out: int) -> list[int]:
+    conditions = [trajectory.condition for trajectory in demonstrations.trajectories]
+    if min(Counter(conditions).values()) == 1:
+        conditions = [()] * len(conditions)  # some are shown once: they cannot be held out each
+    members: dict[tuple[float, ...], list[int]] = {}
+    for number, condition in enumerate(conditions):
+        members.setdefault(condition, []).append(number)
+    kept = (numbers[: len(numbers) - held_out * (len(numbers) >= 2 * held_out)] for numbers in members.values())
+    return sorted(number for numbers in kept for number in numbers)
 
 
 def _check(key: str, demos: Sequence[int], count: int) -> None:

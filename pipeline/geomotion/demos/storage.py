@@ -23,6 +23,7 @@ DATA = "data/chunk-000/file-000.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
 TASKS = "meta/tasks.parquet"
 INFO = "meta/info.json"
+CONDITION = "condition"  # column of the episodes
 OWN_KEY = "geomotion"  # entry of info.json that other tools ignore
 COLUMN_OF_CHANNELS = {"observation.state": False, "action": True}  # whether a column holds velocities
 
@@ -70,6 +71,7 @@ def load(folder: Path) -> Demonstrations:
             licence=own["licence"],
             steps=tuple(own["steps"]),
             joint_names=tuple(own.get("joint_names", ())),  # sets written before names were kept have none
+            condition_names=tuple(own.get("condition_names", ())),
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise CorruptArtefact(folder / INFO, f"lacks what a dataset of this program has ({error})") from error
@@ -111,8 +113,18 @@ def _episodes(demonstrations: Demonstrations) -> "pa.Table":
             "dataset_from_index": np.concatenate([[0], ends[:-1]]),
             "dataset_to_index": ends,
             **{column: np.zeros(count, dtype=np.int64) for column in first_file},
+            **_conditions(demonstrations),
         }
     )
+
+
+def _conditions(demonstrations: Demonstrations) -> dict[str, Any]:
+    import pyarrow as pa
+
+    if not demonstrations.condition_names:
+        return {}
+    values = [list(trajectory.condition) for trajectory in demonstrations.trajectories]
+    return {CONDITION: pa.array(values, pa.list_(pa.float64()))}
 
 
 def _write_tasks(demonstrations: Demonstrations, path: Path) -> None:
@@ -168,9 +180,11 @@ def _trajectories(samples: "pa.Table", episodes: "pa.Table", widths: dict[str, i
             values |= dict(zip(names, np.split(side_by_side, splits, axis=1), strict=True))
     time_s = samples["timestamp"].to_numpy()
     bounds = zip(episodes["dataset_from_index"].to_pylist(), episodes["dataset_to_index"].to_pylist(), strict=True)
+    has_conditions = CONDITION in episodes.column_names
+    conditions = episodes[CONDITION].to_pylist() if has_conditions else [()] * episodes.num_rows
     return [
-        Trajectory(time_s[begin:end], {name: values[name][begin:end] for name in widths}, label)
-        for (begin, end), label in zip(bounds, episodes["label"].to_pylist(), strict=True)
+        Trajectory(time_s[begin:end], {name: values[name][begin:end] for name in widths}, label, tuple(condition))
+        for (begin, end), label, condition in zip(bounds, episodes["label"].to_pylist(), conditions, strict=True)
     ]
 
 

@@ -15,7 +15,13 @@ def summarise(demonstrations: Demonstrations, config: DatasetConfig) -> dict[str
     channel = state_channels(config, demonstrations)[0]
     sets = {**dict.fromkeys(train, "train"), **dict.fromkeys(test, "test")}
     demos = [
-        {"demo": number, "label": trajectory.label, "set": sets.get(number, "unused"), **_numbers(trajectory, channel)}
+        {
+            "demo": number,
+            "label": trajectory.label,
+            "condition": list(trajectory.condition),
+            "set": sets.get(number, "unused"),
+            **_numbers(trajectory, channel),
+        }
         for number, trajectory in enumerate(demonstrations.trajectories)
     ]
     return {
@@ -56,6 +62,7 @@ def summary_table(summary: dict[str, Any]) -> str:
         f"speed [{unit}/s]": [f"{demo['mean_speed']:.4f}" for demo in summary["demos"]],
         f"start [{unit}]": [_vector(demo["start"]) for demo in summary["demos"]],
         f"end [{unit}]": [_vector(demo["end"]) for demo in summary["demos"]],
+        "condition": [_vector(demo["condition"]) if demo["condition"] else "" for demo in summary["demos"]],
         "label": [demo["label"] for demo in summary["demos"]],
     }
     channels = ", ".join(f"{name} ({width})" for name, width in summary["channels"].items())

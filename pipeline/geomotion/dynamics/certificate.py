@@ -8,6 +8,7 @@ from typing import Any
 import torch
 
 from geomotion.dynamics.fields import ChartedField
+from geomotion.dynamics.line_integral import LineIntegralField
 from geomotion.dynamics.linear import LinearField
 from geomotion.dynamics.potential import PotentialField
 from geomotion.types import Float, States, Tensor
@@ -19,6 +20,14 @@ PROOFS: Mapping[type, str] = {
     "a constant rotation: the symmetric part of its Jacobian is at most -τI everywhere, for every value of its "
     "parameters.",
 }
+NOT_A_JACOBIAN = (
+    "The matrix field of Eq. (5.1) is negative definite, but it is in general not the Jacobian of the line integral of "
+    "Eq. (5.2): its rows are not gradients. Contraction is therefore measured on the true Jacobian."
+)
+UNCONSTRAINED = (
+    "Nothing in this network keeps the symmetric part of its Jacobian negative. Whether it contracts can only be "
+    "measured."
+)
 
 
 class Claim(Enum):
@@ -56,6 +65,8 @@ class Certificate:
         reason: Why the claim holds, or why it is only measured.
         overshoot: What the metric means in the robot's own coordinates.
         audit: Measured numbers that bear on the claim.
+        verified_set: The box on which a claim is verified: its corners, in metres (``lower_m``, ``upper_m``) or in the
+            chart's coordinates (``lower``, ``upper``); None for other claims.
     """
 
     claim: Claim
@@ -64,6 +75,7 @@ class Certificate:
     reason: str
     overshoot: Overshoot | None = None
     audit: Mapping[str, float] = field(default_factory=dict)
+    verified_set: Mapping[str, list[float]] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Plain types, for JSON."""
@@ -82,17 +94,20 @@ def certify(model: ChartedField, states: States) -> Certificate:
         return Certificate(
             Claim.by_construction,
             "M(x) = Dψ(x)ᵀDψ(x), the pullback of the Euclidean metric through the chart ψ",
-            model.field.rate / model.time_unit_s,
-            PROOFS[type(model.field)],
+            model.slowest * model.field.rate / model.time_unit_s,
+            PROOFS[type(model.field)] + _about_time(model, model.field.rate),
             overshoot,
         )
-    return Certificate(
-        Claim.measured_only,
-        "Euclidean metric of the chart's coordinates",
-        None,
-        "The matrix field of Eq. (5.1) is negative definite, but it is in general not the Jacobian of the line "
-        "integral of Eq. (5.2): its rows are not gradients. Contraction is therefore measured on the true Jacobian.",
-        overshoot,
+    reason = NOT_A_JACOBIAN if isinstance(model.field, LineIntegralField) else UNCONSTRAINED
+    return Certificate(Claim.measured_only, "Euclidean metric of the chart's coordinates", None, reason, overshoot)
+
+
+def _about_time(model: ChartedField, rate: float) -> str:
+    if model.time_law is None:
+        return ""
+    return (
+        f" Its time law multiplies velocities by a positive number, {model.slowest:.2g} at the least, which the rate "
+        f"accounts for; over the mean duration of {model.time_unit_s:.3g} s distances fall by e^-{rate:.3g}."
     )
 
 

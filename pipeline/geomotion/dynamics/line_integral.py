@@ -63,6 +63,37 @@ def _as_right_hand_side(integrand: Integrand) -> Callable[[Tensor, Tensor], Tens
     return lambda t, _: integrand(t[None]).squeeze(-2)
 
 
+def line_integral(
+    product: Callable[[State, Tensor], State],
+    x: State,
+    base_point: Float[Tensor, " D"],
+    base_velocity: Float[Tensor, " D"],
+    integrator: LineIntegrator,
+) -> Velocity:
+    """The right-hand side of Eq. (5.2).
+
+    Args:
+        product: Matrix at a state times a vector, (y, v) to Ĵ(y) v.
+        x: Where to.
+        base_point: x₀.
+        base_velocity: ẋ₀.
+        integrator: How the integral is computed.
+    """
+    direction = (x - base_point).unsqueeze(-2)
+    # Not a nested def: evaluating its shape annotations in every call would cost a quarter of a query.
+    integrand: Integrand = lambda t: product(base_point + t.unsqueeze(-1) * direction, direction)
+    return integrator(integrand, base_velocity.expand_as(x))
+
+
+def set_base(module: nn.Module, base_point: Float[Tensor, " D"], base_velocity: Float[Tensor, " D"]) -> None:
+    """Give a module x₀ and ẋ₀, each a parameter where it is one, a buffer otherwise."""
+    for name, value in (("base_point", base_point), ("base_velocity", base_velocity)):
+        if isinstance(value, nn.Parameter):
+            module.register_parameter(name, value)
+        else:
+            module.register_buffer(name, value)
+
+
 class LineIntegralField(nn.Module):
     r"""Neural contractive dynamical system: a negative definite matrix, integrated from a base point.
 
@@ -109,19 +140,10 @@ class LineIntegralField(nn.Module):
         self.skew_part = skew_part
         self.regulariser = regulariser
         self.integrator = integrator
-        for name, value in (("base_point", base_point), ("base_velocity", base_velocity)):
-            if isinstance(value, nn.Parameter):
-                self.register_parameter(name, value)
-            else:
-                self.register_buffer(name, value)
+        set_base(self, base_point, base_velocity)
 
     def forward(self, x: State) -> Velocity:
-        direction = (x - self.base_point).unsqueeze(-2)
-        # Not a nested def: evaluating its shape annotations in every call would cost a quarter of a query.
-        integrand: Integrand = lambda t: self._jacobian_product(
-            self.base_point + t.unsqueeze(-1) * direction, direction
-        )
-        return self.integrator(integrand, self.base_velocity.expand_as(x))
+        return line_integral(self._jacobian_product, x, self.base_point, self.base_velocity, self.integrator)
 
     def contraction_jacobian(self, x: State) -> Matrix:
         """Ĵ(x) [1/time]; the Jacobian of this field only for D = 1 or constant Ĵ."""

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import torch
 from torchdiffeq import odeint
 
-from geomotion.dynamics.fields import SolvableField, VectorField
+from geomotion.dynamics.fields import ChartedField, SolvableField, TimedField, VectorField
 from geomotion.errors import InvalidSetting
 from geomotion.types import Float, State, Tensor, Times, Trajectories
 
@@ -62,7 +62,7 @@ def rollout(
     """Follow a field from each start.
 
     Args:
-        field: Autonomous field.
+        field: The field; one that changes with time begins at ``times[0]``.
         starts: States at ``times[0]``.
         times: Output times [s], increasing.
         method: ``auto`` takes the closed form where there is one and ``rk4`` otherwise. ``dopri5`` falls back to
@@ -81,13 +81,15 @@ def rollout(
     note = ""
     if method == "closed_form":
         states = field.solve(starts, (times - times[0]).to(starts))  # type: ignore[attr-defined]
-    elif method == "dopri5":
+    autonomous, augmented = _autonomous(field, starts)
+    if method == "dopri5":
         try:
-            states = _dopri5(field, starts, times, relative_tolerance, absolute_tolerance)
+            states = _dopri5(autonomous, augmented, times, relative_tolerance, absolute_tolerance)
         except _StepSizeCollapsed as failure:
             method, note = "rk4", f"dopri5 failed ({failure}); computed with rk4, {substeps} step(s) per output time."
     if method == "rk4":
-        states = _rk4(field, starts, times, substeps)
+        states = _rk4(autonomous, augmented, times, substeps)
+    states = states[..., : field.dim]
     statuses = judge(field, states, times, goal, goal_tolerance, region)
     return Rollout(states, statuses, method, note)
 
@@ -132,6 +134,13 @@ def _resolve(field: VectorField, method: Method) -> Method:
     if method == "closed_form" and not solvable:
         raise InvalidSetting("solver.method", method, "auto, rk4 or dopri5, because this field has no closed form")
     return method
+
+
+def _autonomous(field: VectorField, starts: State) -> tuple[VectorField, Float[Tensor, "*batch augmented"]]:
+    """A field that changes with time as one of states and their clock, which starts at zero."""
+    if isinstance(field, ChartedField) and field.time_law is not None:
+        return TimedField(field), torch.cat([starts, torch.zeros_like(starts[..., :1])], dim=-1)
+    return field, starts
 
 
 def _rk4(field: VectorField, starts: State, times: Times, substeps: int) -> Trajectories:

@@ -51,6 +51,8 @@ class EigenvalueGrid:
         true: Of ∂f/∂x in the robot's coordinates, shape (n,).
         claimed: Of the true Jacobian in the coordinates where contraction is claimed, shape (n,).
         jhat: Of Ĵ, Eq. (5.1), shape (n,); None for fields without one.
+        true_smallest: The smallest ones of ∂f/∂x, shape (n,); None in evaluations of earlier versions.
+        jhat_smallest: The smallest ones of Ĵ, shape (n,); None for fields without one.
     """
 
     points: Array
@@ -58,6 +60,8 @@ class EigenvalueGrid:
     true: Array
     claimed: Array
     jhat: Array | None
+    true_smallest: Array | None = None
+    jhat_smallest: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -191,8 +195,9 @@ def _eigenvalues(arrays: Arrays) -> EigenvalueGrid | None:
     if not _has(arrays, "grid_points", "true_eigenvalue", "claimed_eigenvalue"):
         return None
     shape = tuple(int(length) for length in arrays.get("grid_shape", np.empty(0)))
-    jhat = _optional(arrays, "jhat_eigenvalue")
-    return EigenvalueGrid(arrays["grid_points"], shape, arrays["true_eigenvalue"], arrays["claimed_eigenvalue"], jhat)
+    largest = arrays["true_eigenvalue"], arrays["claimed_eigenvalue"], _optional(arrays, "jhat_eigenvalue")
+    smallest = _optional(arrays, "true_smallest_eigenvalue"), _optional(arrays, "jhat_smallest_eigenvalue")
+    return EigenvalueGrid(arrays["grid_points"], shape, *largest, *smallest)
 
 
 def _nearby(arrays: Arrays) -> Nearby | None:

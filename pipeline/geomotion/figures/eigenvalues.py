@@ -55,10 +55,16 @@ def robust_norm(values: list[Array]) -> CenteredNorm:
     return CenteredNorm(0.0, magnitude or 1.0)
 
 
+def on_grid(points: Array, shape: tuple[int, ...], values: Array) -> tuple[Array, Array, Array]:
+    """First and second coordinate [m] and values at the points of a planar grid, each of its shape."""
+    order = np.lexsort((points[:, 0], points[:, 1]))
+    x, y, ordered = (column[order].reshape(shape) for column in (points[:, 0], points[:, 1], values))
+    return x, y, ordered
+
+
 def draw_eigenvalue_map(ax: Axes, points: Array, shape: tuple[int, ...], panel: Panel, norm: Normalize) -> Axes:
     """Draw eigenvalues on a planar grid; the area that does not contract is hatched and outlined."""
-    order = np.lexsort((points[:, 0], points[:, 1]))
-    x, y, eigenvalues = (column[order].reshape(shape) for column in (points[:, 0], points[:, 1], panel.eigenvalues))
+    x, y, eigenvalues = on_grid(points, shape, panel.eigenvalues)
     ax.pcolormesh(x, y, eigenvalues, norm=norm, cmap=COLOURMAP, shading="nearest", rasterized=True)
     if panel.eigenvalues.min() < 0 <= panel.eigenvalues.max():
         ax.contourf(x, y, eigenvalues, levels=[0, np.inf], colors="none", hatches=["////"])

@@ -81,6 +81,22 @@ def figure_motion(data: EvaluationArrays) -> Figure:
     return _figure_plane(data) if data.dim == 2 else _figure_coordinates(data)
 
 
+def draw_plane(ax: Axes, data: EvaluationArrays, grid_rollouts: int) -> Axes:
+    """Draw a planar field with all demonstrations and rollouts, and as many of the rollouts from the grid."""
+    if data.flow is not None:
+        draw_flow(ax, data.flow)
+        ax.set(xlim=_limits(data.flow.points[:, 0]), ylim=_limits(data.flow.points[:, 1]))
+    if data.region is not None:
+        rollouts = data.region.rollouts
+        draw_grid_rollouts(ax, rollouts[widely_spread(rollouts[:, 0], grid_rollouts)])
+    draw_demonstrations(ax, data.judged)
+    draw_rollouts(ax, data.judged)
+    if data.goal_starts is not None:
+        draw_goal(ax, data.goal_starts.goal)
+    label_plane(ax)
+    return ax
+
+
 def widely_spread(points: Array, count: int) -> list[int]:
     """Numbers of `count` points far from each other: each next one is farthest from those taken before.
 
@@ -99,19 +115,8 @@ def widely_spread(points: Array, count: int) -> list[int]:
 def _figure_plane(data: EvaluationArrays) -> Figure:
     width_mm, height_mm = panel_size_mm(data.extent, side_mm=95)
     figure = new_figure(max(width_mm + 15, LEGEND_MM), height_mm + 20)
-    ax = figure.add_subplot()
-    if data.flow is not None:
-        draw_flow(ax, data.flow)
-        ax.set(xlim=_limits(data.flow.points[:, 0]), ylim=_limits(data.flow.points[:, 1]))
-    if data.region is not None:
-        rollouts = data.region.rollouts
-        draw_grid_rollouts(ax, rollouts[widely_spread(rollouts[:, 0], GRID_ROLLOUTS)])
-    draw_demonstrations(ax, data.judged)
-    draw_rollouts(ax, data.judged)
-    if data.goal_starts is not None:
-        draw_goal(ax, data.goal_starts.goal)
-    label_plane(ax)
-    _legend(figure, data)
+    draw_plane(figure.add_subplot(), data, GRID_ROLLOUTS)
+    add_legend(figure, data)
     return figure
 
 
@@ -126,7 +131,7 @@ def _figure_coordinates(data: EvaluationArrays) -> Figure:
             ax.set_axis_off()
     for ax in grid[-1]:
         ax.set_xlabel("time [s]")
-    _legend(figure, data)
+    add_legend(figure, data)
     return figure
 
 
@@ -134,7 +139,9 @@ def _limits(values: Array) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def _legend(figure: Figure, data: EvaluationArrays) -> None:
+def add_legend(figure: Figure, data: EvaluationArrays) -> None:
+    """Say above the panels what lines and marks are."""
+
     def line(label: str, colour: str, style: Any = "-") -> Line2D:
         return Line2D([], [], color=COLOUR[colour], linestyle=style, label=label)
 

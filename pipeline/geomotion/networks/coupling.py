@@ -7,6 +7,10 @@ pass through the conditioners serves ψ(x) and Dψ(x)⁻¹ ż alike.
 Which coordinates are kept is a matter of zeros in the layers' matrices: all layers have the same shapes in any
 dimension, and nothing is gathered or concatenated, which would cost more than the arithmetic where a control loop asks
 for one state at a time.
+
+With a context c, the linear maps are affine in it, W(c) = W₀ + Σ cₖ Wₖ: each c has a flow of its own, as large as one
+without context, and nearby contexts have similar ones. Letting the Fourier features depend on c instead would make all
+contexts share the parameters of one flow.
 """
 
 import math
@@ -26,12 +30,16 @@ class CouplingFlow(nn.Module):
 
     In two dimensions the coordinates take turns; in more, random halves do, each pair of layers moving all of them.
 
+    With context, states are (x, c) and ψ(x, c) = (ψ_c(x), c) with ψ_c(0) = 0 for every c and all parameters. Tangents
+    that are pushed forward leave c as it is.
+
     Args:
-        dim: D, at least 2.
+        dim: Coordinates that are moved, at least 2.
         layers: Couplings.
         features: Fourier features of each, per kept coordinate; cosine and sine of one angle count as two.
         length_scales: Over which the features vary, in the input's units; the features are spread evenly over them.
         log_scale_cap: Largest |s| of one coupling.
+        context: K, coordinates behind those that are moved.
     """
 
     frequencies: Tensor
@@ -39,10 +47,17 @@ class CouplingFlow(nn.Module):
     moved: Tensor
 
     def __init__(
-        self, dim: int, layers: int, features: int, length_scales: Sequence[float], log_scale_cap: float
+        self,
+        dim: int,
+        layers: int,
+        features: int,
+        length_scales: Sequence[float],
+        log_scale_cap: float,
+        context: int = 0,
     ) -> None:
         super().__init__()
-        self.dim = dim
+        self.dim = dim + context
+        self.context = context
         self.log_scale_cap = log_scale_cap
         kept = alternating_halves(dim, layers)
         pairs = features // 2 * (dim // 2)
@@ -53,29 +68,32 @@ class CouplingFlow(nn.Module):
         self.register_buffer("phases", torch.tensor([0.0, -math.pi / 2]).repeat_interleave(pairs))
         self.register_buffer("moved", (~kept).to(frequencies))
         self.gain = math.sqrt(1 / pairs)  # each pair of cosine and sine has norm 1
-        self.weight = nn.Parameter(torch.zeros(layers, 2 * pairs, 2 * dim))
-        self.bias = nn.Parameter(torch.zeros(layers, 2 * dim))
+        self.weight = nn.Parameter(torch.zeros(layers, 2 * pairs, (1 + context) * 2 * dim))
+        self.bias = nn.Parameter(torch.zeros(layers, (1 + context) * 2 * dim))
 
     def to_latent(self, x: State) -> State:
         """ψ(x)."""
+        x, context = self._split(x)
         for frequencies, weight, bias in self._layers():
-            squashed, shift, _ = self._condition(x, frequencies, weight, bias)
+            squashed, shift, _ = self._condition(x, context, frequencies, weight, bias)
             x = x * self._scale(squashed) + shift
-        return x
+        return _join(x, context)
 
     def to_ambient(self, z: State) -> State:
         """ψ⁻¹(z)."""
+        z, context = self._split(z)
         for frequencies, weight, bias in reversed(self._layers()):
             # kept coordinates are the same on both sides of a layer, so its conditioner can be asked again
-            squashed, shift, _ = self._condition(z, frequencies, weight, bias)
+            squashed, shift, _ = self._condition(z, context, frequencies, weight, bias)
             z = (z - shift) * self._scale(-squashed)
-        return z
+        return _join(z, context)
 
     def linearise(self, x: State) -> tuple[State, PushForward]:
         """ψ(x) and ż ↦ Dψ(x)⁻¹ ż."""
+        x, context = self._split(x)
         tape = []
         for frequencies, weight, bias in self._layers():
-            squashed, shift, angles = self._condition(x, frequencies, weight, bias)
+            squashed, shift, angles = self._condition(x, context, frequencies, weight, bias)
             scale = self._scale(squashed)
             scaled = x * scale
             tape.append((frequencies, weight, angles, squashed, scale, scaled))
@@ -83,29 +101,62 @@ class CouplingFlow(nn.Module):
 
         def push_forward(tangent: Tensor) -> Tensor:
             # a tangent's kept coordinates pass a layer unchanged, so the angles' rates are known before it is undone
+            tangent, still = self._split(tangent)
             for frequencies, weight, angles, squashed, scale, scaled in reversed(tape):
                 falling = torch.sin(angles) * (tangent @ frequencies)  # minus the rate of the features
-                raw, shift = (falling @ weight).chunk(2, -1)
+                raw, shift = _weighted(falling, weight, context).chunk(2, -1)
                 log_scale = raw * (self.log_scale_cap - self.log_scale_cap * squashed * squashed)
                 tangent = (tangent + scaled * log_scale + shift) / scale
-            return tangent
+            return _join(tangent, still)
 
-        return x, push_forward
+        return _join(x, context), push_forward
+
+    def _split(self, x: State) -> tuple[Tensor, Tensor | None]:
+        """What is moved, and the context."""
+        return (x, None) if self.context == 0 else (x[..., : -self.context], x[..., -self.context :])
 
     def _layers(self) -> list[tuple[Tensor, Tensor, Tensor]]:
         """Frequencies, weight and bias of each layer, with zeros where kept coordinates would be moved."""
-        mask = torch.cat([self.moved / self.log_scale_cap, self.moved], -1)
-        weight = self.weight * (self.gain * mask[:, None])
-        return list(zip(self.frequencies.unbind(), weight.unbind(), (self.bias * mask).unbind(), strict=True))
+        log_scales = self.moved / self.log_scale_cap
+        weight_mask = torch.cat([log_scales, self.moved], -1).repeat(1, 1 + self.context)
+        weight = self.weight * (self.gain * weight_mask[:, None])
+        bias = self.bias * (weight_mask if self.context == 0 else self._bias_mask(log_scales))
+        return list(zip(self.frequencies.unbind(), weight.unbind(), bias.unbind(), strict=True))
 
-    def _condition(self, x: State, frequencies: Tensor, weight: Tensor, bias: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def _bias_mask(self, log_scales: Tensor) -> Tensor:
+        """No shift without features, which vanish at the origin where there is context."""
+        return torch.cat([log_scales, torch.zeros_like(log_scales)], -1).repeat(1, 1 + self.context)
+
+    def _condition(
+        self, x: State, context: Tensor | None, frequencies: Tensor, weight: Tensor, bias: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor]:
         """s / cap and t, zero for kept coordinates, and the angles behind them."""
         angles = x @ frequencies + self.phases
-        raw, shift = (torch.cos(angles) @ weight + bias).chunk(2, -1)
+        features = torch.cos(angles)
+        if context is None:
+            raw, shift = (features @ weight + bias).chunk(2, -1)
+        else:
+            features = features - torch.cos(self.phases)
+            raw, shift = (_weighted(features, weight, context) + _affine(bias, context)).chunk(2, -1)
         return torch.tanh(raw), shift, angles
 
     def _scale(self, squashed: State) -> State:
         return (self.log_scale_cap * squashed).exp()
+
+
+def _weighted(features: Tensor, weight: Tensor, context: Tensor | None) -> Tensor:
+    """Features times W(c)."""
+    return features @ weight if context is None else _affine(features @ weight, context)
+
+
+def _affine(values: Float[Tensor, "*#batch terms"], context: Float[Tensor, "*batch K"]) -> Float[Tensor, "*batch out"]:
+    """v₀ + Σ cₖ vₖ of 1 + K vectors side by side."""
+    terms: Tensor = values.unflatten(-1, (1 + context.shape[-1], -1))  # type: ignore[no-untyped-call]
+    return terms[..., 0, :] + (terms[..., 1:, :] * context[..., None]).sum(-2)
+
+
+def _join(x: Tensor, context: Tensor | None) -> Tensor:
+    return x if context is None else torch.cat([x, context], -1)
 
 
 def alternating_halves(dim: int, layers: int) -> Bool[Tensor, "layer D"]:

@@ -7,13 +7,20 @@ import torch
 from torch import nn
 
 from geomotion.errors import UnknownName
-from geomotion.types import Float, Matrix, State, Tensor
+from geomotion.types import Float, Matrix, Tensor
 
-ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "softplus": nn.Softplus, "sigmoid": nn.Sigmoid}
+ACTIVATIONS: dict[str, type[nn.Module]] = {
+    "tanh": nn.Tanh,
+    "softplus": nn.Softplus,
+    "sigmoid": nn.Sigmoid,
+    "silu": nn.SiLU,
+    "elu": nn.ELU,
+    "relu": nn.ReLU,  # has kinks
+}
 
 
 class MLP(nn.Sequential):
-    """Fully connected layers with a smooth activation between them and none after the last.
+    """Fully connected layers with an activation between them and none after the last.
 
     Args:
         inputs: Size of the input.
@@ -43,17 +50,17 @@ class MLP(nn.Sequential):
 
 
 class JacobianRoot(nn.Module):
-    """J_θ: a network from states to square matrices.
+    """J_θ: a network from states to square matrices; with context, from states and conditions side by side.
 
-    Source: Thesis Eq. (5.1).
+    Source: Thesis Eq. (5.1), (5.13).
     """
 
-    def __init__(self, dim: int, hidden_units: Sequence[int], activation: str = "tanh") -> None:
+    def __init__(self, dim: int, hidden_units: Sequence[int], activation: str = "tanh", context: int = 0) -> None:
         super().__init__()
         self.dim = dim
-        self.network = MLP(dim, dim * dim, hidden_units, activation)
+        self.network = MLP(dim + context, dim * dim, hidden_units, activation)
 
-    def forward(self, x: State) -> Matrix:
+    def forward(self, x: Float[Tensor, "*batch inputs"]) -> Matrix:
         matrix: Matrix = self.network(x).unflatten(-1, (self.dim, self.dim))
         return matrix
 
@@ -68,15 +75,15 @@ class SkewMatrix(nn.Module):
 
     basis: Tensor
 
-    def __init__(self, dim: int, hidden_units: Sequence[int], activation: str = "tanh") -> None:
+    def __init__(self, dim: int, hidden_units: Sequence[int], activation: str = "tanh", context: int = 0) -> None:
         super().__init__()
         self.dim = dim
         rows, columns = torch.tril_indices(dim, dim, -1)
         lower = torch.zeros(len(rows), dim, dim)
         lower[torch.arange(len(rows)), rows, columns] = 1
         self.register_buffer("basis", (lower - lower.mT).flatten(1), persistent=False)
-        self.network = MLP(dim, len(rows), hidden_units, activation)
+        self.network = MLP(dim + context, len(rows), hidden_units, activation)
 
-    def forward(self, x: State) -> Matrix:
+    def forward(self, x: Float[Tensor, "*batch inputs"]) -> Matrix:
         matrix: Matrix = (self.network(x) @ self.basis).unflatten(-1, (self.dim, self.dim))
         return matrix

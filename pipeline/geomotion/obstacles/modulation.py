@@ -8,58 +8,20 @@ Source: Huber, Slotine, Billard (2022), Avoiding dense and dynamic obstacles in 
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from functools import partial
 
 import torch
 from torch import nn
 
-from geomotion.dynamics.fields import VectorField
+from geomotion.dynamics.fields import TimedVelocity, VectorField
 from geomotion.errors import InvalidSetting, ShapeMismatch
+from geomotion.obstacles.contact import Contact
 from geomotion.obstacles.obstacle import Obstacle
 from geomotion.obstacles.solids import length, unit
+from geomotion.obstacles.ways import Way, choose_way, escape, own_way
 from geomotion.types import Float, Matrix, State, Tensor, Velocity
 
-STALLED = 0.2  # share of the field's own speed below which the escape field helps
-NO_PREFERENCE = 1e-6  # of the field's speed: a smaller tangential part says nothing about the way around
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Where states are, as seen from one obstacle.
-
-    Attributes:
-        level: Γ, shape (*batch, 1).
-        normal: Unit normal n of the level set.
-        lift: r/(nᵀr): moves along the reference direction r, by one along the normal.
-    """
-
-    level: Float[Tensor, "*batch 1"]
-    normal: State
-    lift: State
-
-    @classmethod
-    def at(cls, obstacle: Obstacle, x: State) -> "Contact":
-        """At the reference point, which has no direction, r and n are the first axis."""
-        offset = x - obstacle.reference
-        is_undefined = (offset == 0).all(dim=-1, keepdim=True)
-        first = torch.eye(obstacle.dim).to(x)[0]
-        direction = torch.where(is_undefined, first, unit(offset))
-        normal = torch.where(is_undefined, first, obstacle.normal(x))
-        lift = direction / (direction * normal).sum(dim=-1, keepdim=True)
-        return cls(obstacle.level(x)[..., None], normal, lift)
-
-    def decay(self, reactivity: float) -> Float[Tensor, "*batch 1"]:
-        """Γ^{-1/ρ}; inside the obstacle Γ counts as one."""
-        return self.level.clamp(min=1) ** (-1 / reactivity)
-
-    def crossing(self, velocity: Velocity) -> Float[Tensor, "*batch 1"]:
-        """The normal component of a velocity."""
-        return (velocity * self.normal).sum(dim=-1, keepdim=True)
-
-    def modulate(self, velocity: Velocity, reactivity: float) -> Velocity:
-        """G times a velocity, without the matrix."""
-        decay = self.decay(reactivity)
-        return (1 + decay) * velocity - 2 * decay * self.crossing(velocity) * self.lift
+RECOVERED = 0.1  # of the smallest radius: the depth up to which the field's own crossing speed fades in
 
 
 def modulation_matrix(obstacle: Obstacle, x: State, reactivity: float = 1.0) -> Matrix:
@@ -77,8 +39,8 @@ def modulation_matrix(obstacle: Obstacle, x: State, reactivity: float = 1.0) -> 
 
     Source: Thesis Eq. (5.10)-(5.12).
     """
-    contact = Contact.at(obstacle, x)
-    decay = contact.decay(reactivity)[..., None]
+    contact = Contact.at(obstacle, x, reactivity)
+    decay = contact.decay[..., None]
     eye = torch.eye(obstacle.dim).to(x)
     return (1 + decay) * eye - 2 * decay * contact.lift[..., :, None] * contact.normal[..., None, :]
 
@@ -90,16 +52,18 @@ class ModulatedField(nn.Module):
     weights ∝ 1/(Γ_o - 1), for speeds and for angles to f apart. At the surface of one obstacle only this one counts.
 
     Started inside an obstacle, a state is driven out along the reference direction, at the speed with which the field
-    crosses the level sets plus a part that grows with depth.
+    crosses the level sets plus a part that grows with depth. Both vanish at the surface, so that the field is
+    continuous there.
 
     Args:
         field: f.
         obstacles: One or more, in the precision of the states.
         reactivity: ρ of Eq. (5.12).
-        escape: Whether a tangential field helps where obstacles bring the motion to rest, Eq. (6.9). It shortens the
-            stay near a saddle, as convex obstacles have one; where the field converges from all sides to a point on an
-            obstacle, it moves that point only.
+        escape: Whether a tangential field helps where obstacles bring the motion to rest, Eq. (6.9): around the
+            obstacle on one of several ways, see :mod:`geomotion.obstacles.ways`.
         recovery_time_s: How long the second part takes to cross the obstacle's smallest radius [s].
+        hold: Whether an obstacle slows what moves away from it, too, as (5.12) has it: behind it, states at its surface
+            then leave as slowly as others approach it.
         time_s: When velocities are asked for, for moving obstacles [s].
 
     Raises:
@@ -114,6 +78,7 @@ class ModulatedField(nn.Module):
         reactivity: float = 1.0,
         escape: bool = True,
         recovery_time_s: float = 0.1,
+        hold: bool = False,
         time_s: float = 0.0,
     ) -> None:
         super().__init__()
@@ -127,18 +92,21 @@ class ModulatedField(nn.Module):
                 raise ShapeMismatch("coordinates of an obstacle", field.dim, obstacle.dim)
         self.field, self.dim = field, field.dim
         self.obstacles = tuple(obstacles)
-        self.reactivity, self.escape, self.recovery_time_s = reactivity, escape, recovery_time_s
-        self.time_s = time_s
+        self.reactivity, self.recovery_time_s, self.hold, self.time_s = reactivity, recovery_time_s, hold, time_s
+        self.ways = [self._way(obstacle) if escape else None for obstacle in obstacles]
 
     def forward(self, x: State) -> Velocity:
         return self.velocity(x, torch.full_like(x[..., :1], self.time_s))
 
     def velocity(self, x: State, time: Float[Tensor, "*batch 1"]) -> Velocity:
         """ẋ at states and times since the obstacles were where their reference points say [s]."""
-        wanted = self.field(x)
+        wanted = self.field.velocity(x, time) if isinstance(self.field, TimedVelocity) else self.field(x)
         shifted = [x - obstacle.velocity * time for obstacle in self.obstacles]
         pairs = list(zip(self.obstacles, shifted, strict=True))
-        velocities = [self._around(obstacle, y, wanted) for obstacle, y in pairs]
+        velocities = [
+            obstacle.velocity + self._flow(obstacle, y, wanted - obstacle.velocity, way)
+            for (obstacle, y), way in zip(pairs, self.ways, strict=True)
+        ]
         if len(velocities) == 1:
             return velocities[0]
         levels = torch.stack([obstacle.level(y) for obstacle, y in pairs])
@@ -150,43 +118,20 @@ class ModulatedField(nn.Module):
         later.time_s = time_s
         return later
 
-    def _around(self, obstacle: Obstacle, x: State, wanted: Velocity) -> Velocity:
-        relative = wanted - obstacle.velocity
-        contact = Contact.at(obstacle, x)
-        velocity = contact.modulate(relative, self.reactivity)
-        if self.escape:
-            velocity = velocity + contact.modulate(_escape(contact, relative, velocity), self.reactivity)
-        depth = (1 - contact.level) * obstacle.inradius
-        push = (contact.crossing(relative).abs() + depth / self.recovery_time_s) * contact.lift
-        return obstacle.velocity + velocity + torch.where(depth > 0, push, 0.0)
+    def _way(self, obstacle: Obstacle) -> Way:
+        """Of an obstacle that moves, where a trial would be out of date, the one that f prefers."""
+        if bool(obstacle.velocity.any()):
+            return own_way
+        return choose_way(self.field, obstacle, partial(self._flow, obstacle))
 
-
-class TimedField(nn.Module):
-    """A modulated field and its clock as one autonomous field: the last coordinate of a state is the time [s]."""
-
-    def __init__(self, field: ModulatedField) -> None:
-        super().__init__()
-        self.field = field
-        self.dim = field.dim + 1
-
-    def forward(self, state: State) -> Velocity:
-        time = state[..., -1:]
-        return torch.cat([self.field.velocity(state[..., :-1], time), torch.ones_like(time)], dim=-1)
-
-
-def _escape(contact: Contact, relative: Velocity, modulated: Velocity) -> Velocity:
-    """β g: as fast as the field, along the surface, the stronger the slower the modulated motion is."""
-    speed = length(relative)
-    tangential = relative - contact.crossing(relative) * contact.lift
-    way = torch.where(length(tangential) > NO_PREFERENCE * speed, unit(tangential), _any_tangent(contact.normal))
-    share = length(modulated) / speed.clamp(min=torch.finfo(speed.dtype).tiny)
-    return (1 - share / STALLED).clamp(min=0).square() * speed * way
-
-
-def _any_tangent(normal: State) -> State:
-    """A unit vector across the normal: the most transverse axis, projected; zero in one dimension."""
-    axis = torch.eye(normal.shape[-1]).to(normal)[normal.abs().argmin(dim=-1)]
-    return unit(axis - normal * (axis * normal).sum(dim=-1, keepdim=True))
+    def _flow(self, obstacle: Obstacle, x: State, relative: Velocity, way: Way | None) -> Velocity:
+        contact = Contact.at(obstacle, x, self.reactivity)
+        velocity = contact.modulate(relative, self.hold)
+        if way is not None:
+            velocity = velocity + contact.modulate(escape(contact, relative, velocity, way(contact, relative)))
+        depth = (1 - contact.level).clamp(min=0) * obstacle.inradius
+        crossing = contact.crossing(relative).abs() * (depth / (RECOVERED * obstacle.inradius)).clamp(max=1)
+        return velocity + (crossing + depth / self.recovery_time_s) * contact.lift
 
 
 def _weights(levels: Float[Tensor, "obstacle *batch"]) -> Float[Tensor, "obstacle *batch"]:

@@ -8,6 +8,7 @@ import torch
 from geomotion.obstacles.body import Body
 from geomotion.types import Float, State, Tensor, Times
 
+OVERLAP_SAMPLES = 1000
 BISECTIONS = 60  # halves an interval until neighbouring double-precision numbers
 
 
@@ -15,7 +16,7 @@ BISECTIONS = 60  # halves an interval until neighbouring double-precision number
 class Obstacle(Body, Protocol):
     """A solid body that every ray from its reference point leaves exactly once (star-shaped).
 
-    Its signed distance is exact and differentiable outside.
+    Its signed distance is differentiable outside.
     """
 
     def level(self, x: State) -> Float[Tensor, "*batch"]:
@@ -46,6 +47,18 @@ def surface_points(obstacle: Obstacle, directions: Float[Tensor, "*batch D"]) ->
         is_inside = (obstacle.level(obstacle.reference + middle * directions) < 1)[..., None]
         low, high = torch.where(is_inside, middle, low), torch.where(is_inside, high, middle)
     return obstacle.reference + high * directions
+
+
+def overlap(first: Obstacle, second: Obstacle) -> bool:
+    """Whether points of a body, on its surface or its reference point, lie in another one, both at time zero.
+
+    The surface is sampled, so that a thin tip may be missed; the other way round it is not missed.
+    """
+    dim = first.dim
+    directions = torch.randn(OVERLAP_SAMPLES, dim, generator=torch.Generator().manual_seed(0)).to(first.reference)
+    surface = surface_points(first, directions / directions.norm(dim=-1, keepdim=True))
+    points = torch.cat([surface, first.reference[None]])
+    return bool((second.level(points) < 1).any())
 
 
 def clearance(

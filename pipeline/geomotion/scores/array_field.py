@@ -33,9 +33,11 @@ class ArrayField:
         return _array(rollout(self.field, self.tensor(starts), self.tensor(times_s), **self._rollout_options).states)
 
     @torch.no_grad()
-    def velocity(self, states: Points) -> Points:
-        """ẋ at each state [m/s]."""
-        return _array(self.field(self.tensor(states)))
+    def velocity(self, states: Points, elapsed_s: Float[np.ndarray, " point"] | None = None) -> Points:
+        """ẋ at each state [m/s], at times since the start of the motion [s]; without times, at mean speed."""
+        if elapsed_s is None:
+            return _array(self.field(self.tensor(states)))
+        return _array(self.field.velocity(self.tensor(states), self.tensor(elapsed_s)[:, None]))
 
     @torch.no_grad()
     def to_claimed(self, states: Points) -> Points:

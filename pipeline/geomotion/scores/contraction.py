@@ -3,12 +3,14 @@
 Signs follow Tables 5.1 and 5.2: the rate is the largest eigenvalue of the symmetric part, and negative contracts.
 """
 
+import copy
+
 import numpy as np
 from jaxtyping import Float
 
 from geomotion.dynamics.fields import ChartedField
 from geomotion.scores.evaluation import Evaluation
-from geomotion.scores.jacobians import Eigenvalues, field_jacobian, symmetric_eigenvalues
+from geomotion.scores.jacobians import Eigenvalues, eigenvalues_in_metric, field_jacobian, symmetric_eigenvalues
 from geomotion.scores.score import Score, max_score, mean_score, share_score
 from geomotion.types import States
 
@@ -48,7 +50,31 @@ def judge_contraction(field: ChartedField, points: States, note: str) -> Evaluat
         for quantity, score in contraction_scores(eigenvalues, notes[name]).items()
     }
     arrays = {f"{name}_eigenvalue": eigenvalues[:, -1] for name, eigenvalues in spectra.items()}
+    arrays |= {f"{name}_smallest_eigenvalue": eigenvalues[:, 0] for name, eigenvalues in spectra.items()}
     return Evaluation(scores, {"jhat_eigenvalue": np.empty(0)} | arrays, omitted)
+
+
+def judge_condition(field: ChartedField, points: States, rate: float, note: str) -> Evaluation:
+    r"""By how much a field misses the contraction that is claimed in the metric of its chart.
+
+    .. math:: \max_x \lambda_{\max}\!\left(M^{-1} (M J + J^\top M + \dot M) / 2\right) + \tau \le 0,
+        \qquad M = D\psi^\top D\psi
+
+    J is that of the field in the robot's coordinates; the latent field is not looked at.
+
+    Args:
+        field: The field; it is judged in double precision.
+        points: Where to judge it [m].
+        rate: τ [1/s].
+        note: How the points were chosen.
+
+    Source:
+        Thesis Eq. (2.15).
+    """
+    exact = copy.deepcopy(field).double().eval()
+    margins = eigenvalues_in_metric(exact, exact.chart, points.double())[:, -1] + rate
+    statement = f"largest eigenvalue of M⁻¹(MJ + JᵀM + Ṁ)/2, plus the proven rate: at most 0 up to rounding; {note}"
+    return Evaluation({"contraction.condition.margin": max_score(margins.numpy(), "1/s", statement)})
 
 
 def contraction_scores(eigenvalues: Float[np.ndarray, "point D"], note: str) -> dict[str, Score]:

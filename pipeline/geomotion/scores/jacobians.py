@@ -46,7 +46,7 @@ def symmetric_eigenvalues(jacobians: Jacobians) -> Eigenvalues:
 def eigenvalues_in_metric(field: Map, chart: Chart, x: States) -> Eigenvalues:
     r"""Contraction of a field in the metric of a chart, computed in the robot's coordinates.
 
-    .. math:: \tfrac12 (M J + J^\top M + \dot M)\, v = \lambda M v, \qquad M = D\psi^\top D\psi
+    .. math:: \tfrac12 (M J + J^\top M + \dot M)\, v = \lambda M v, \qquad M = \Theta^\top \Theta, \quad \Theta = D\psi
 
     The result equals :func:`symmetric_eigenvalues` of the latent field's Jacobian where there is a latent field;
     this form also serves fields that were changed in the robot's coordinates. It is slower, because it needs second
@@ -58,14 +58,23 @@ def eigenvalues_in_metric(field: Map, chart: Chart, x: States) -> Eigenvalues:
     Source:
         Thesis Eq. (2.15).
     """
+    return symmetric_eigenvalues(generalised_jacobian(field, chart, x)[0])
+
+
+def generalised_jacobian(field: Map, chart: Chart, x: States) -> tuple[Jacobians, Float[Tensor, " point"]]:
+    r"""(Θ̇ + ΘJ) Θ⁻¹ with Θ = Dψ, whose symmetric part has the eigenvalues of :func:`eigenvalues_in_metric`.
+
+    Returns:
+        The matrices, and ‖Θ‖ ‖J‖ ‖Θ⁻¹‖ at each point: the terms of the sum are about as large and may cancel, so that
+        rounding errors are a small multiple of the relative precision times this.
+    """
     jacobians = field_jacobian(field, x)
     velocities = field(x).detach()
-    chart_jacobian, chart_jacobian_rate = jvp(lambda y: _forward_jacobian(chart.to_latent, y), (x,), (velocities,))[:2]
-    metric = chart_jacobian.mT @ chart_jacobian
-    # sym(MJ) + Ṁ/2 is the symmetric part of MJ + Dψᵀ d/dt Dψ
-    form = metric @ jacobians + chart_jacobian.mT @ chart_jacobian_rate
-    inverse_root = torch.linalg.inv(torch.linalg.cholesky(metric))
-    return symmetric_eigenvalues(inverse_root @ form @ inverse_root.mT).detach()
+    theta, theta_rate = jvp(lambda y: _forward_jacobian(chart.to_latent, y), (x,), (velocities,))[:2]
+    inverse = torch.linalg.inv(theta.detach())
+    matrices = (theta_rate + theta @ jacobians).detach() @ inverse
+    sizes = [part.detach().norm(dim=(-2, -1)) for part in (theta, jacobians, inverse)]
+    return matrices, torch.stack(sizes).prod(0)
 
 
 def _forward_jacobian(function: Map, x: States) -> Jacobians:

@@ -5,10 +5,12 @@ import sys
 
 import torch
 
-from geomotion.config import CommandConfig, GmsConfig
+from geomotion.config import CommandConfig
 from geomotion.errors import MissingRun
 from geomotion.interrupts import interrupts_as_errors
-from geomotion.stages.session import Program, VerbResult, log_to_standard_error, open_session
+from geomotion.stages.programs import program_of
+from geomotion.stages.session import VerbResult, log_to_standard_error, open_session
+from geomotion.stages.studies import run_study
 from geomotion.tracking import store
 
 __all__ = ["VerbResult", "run_verb"]
@@ -20,7 +22,7 @@ def run_verb(verb: str, config: CommandConfig, overrides: list[str]) -> VerbResu
     Raises:
         GeomotionError: For everything that the user can mend.
     """
-    program = _program(config)
+    program = program_of(config)
     log_to_standard_error()
     torch.set_num_threads(1)  # the networks are small: a second thread costs up to twenty times what it gives
     if verb == "ui":
@@ -30,18 +32,7 @@ def run_verb(verb: str, config: CommandConfig, overrides: list[str]) -> VerbResu
         store.database_errors(store.store_uri(config.tracking)),
         open_session(program, verb, config, overrides) as session,
     ):
-        return program.verbs[verb](session)
-
-
-def _program(config: CommandConfig) -> Program:
-    """Only the program asked for is imported."""
-    if isinstance(config, GmsConfig):
-        from geomotion.stages.gms_verbs import GMS
-
-        return GMS
-    from geomotion.stages.ncds_verbs import NCDS
-
-    return NCDS
+        return program.verbs[verb](session) if not config.study.variants else run_study(session, verb)
 
 
 def _ui(config: CommandConfig, program: str) -> VerbResult:

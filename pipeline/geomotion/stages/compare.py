@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from geomotion.tables import aligned
+from geomotion.tables import aligned, number
 
 OBJECTIVE = (
     "heldout.dtwd_per_point",
@@ -45,7 +45,4 @@ def comparison_table(comparison: Mapping[str, Any]) -> str:
 
 
 def _cell(score: Mapping[str, Any] | None) -> str:
-    if score is None or score["value"] is None:
-        return "-" if score is None else "not finite"
-    spread = f" ± {score['spread']:.3g}" if score["spread"] else ""
-    return f"{score['value']:.4g}{spread}"
+    return "-" if score is None else number(score["value"], score["spread"])

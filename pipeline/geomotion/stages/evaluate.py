@@ -3,13 +3,14 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as default
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geomotion import models
-from geomotion.config import EvaluationConfig, Protocol, SolverConfig
+from geomotion.config import EvaluationConfig, NoObstacle, ObstacleConfig, Protocol, SolverConfig
 from geomotion.demos import storage
 from geomotion.demos.demonstrations import Demonstrations, Trajectory
 from geomotion.errors import InvalidSetting
@@ -17,7 +18,7 @@ from geomotion.figures.evaluation import save_all
 from geomotion.files import atomic, read_json, write_json
 from geomotion.models import Skill
 from geomotion.scores.array_field import ArrayField
-from geomotion.scores.contraction import judge_contraction
+from geomotion.scores.contraction import judge_condition, judge_contraction
 from geomotion.scores.evaluation import Evaluation, Unit, combine
 from geomotion.scores.goal import judge_goal
 from geomotion.scores.grids import Box, bounding_box, sample_box
@@ -25,6 +26,8 @@ from geomotion.scores.nearby import judge_nearby, nearby_starts
 from geomotion.scores.reproduction import Judged, judge_reproduction
 from geomotion.scores.support import RegionProtocol, judge_region
 from geomotion.scores.table import scores_table
+from geomotion.stages.evaluate_obstacles import certificate_part, judge_among_obstacles
+from geomotion.stages.verification import prove
 from geomotion.tracking import Artefacts, StageRun
 
 __all__ = ["EvaluateConfig", "compute", "evaluate", "scores_table"]
@@ -41,10 +44,12 @@ class EvaluateConfig:
     Attributes:
         evaluation: Protocol and grids.
         solver: How rollouts are computed.
+        obstacle: Among what the field is judged as well.
     """
 
     evaluation: EvaluationConfig
     solver: SolverConfig
+    obstacle: ObstacleConfig = default(default_factory=NoObstacle)
 
 
 def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
@@ -60,11 +65,17 @@ def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: Stage
     certificate = read_json(inputs["train"].path("certificate.json"))
 
     evaluation = compute(skill, demonstrations, certificate["rate_per_s"], config.evaluation, config.solver)
+    known = np.concatenate([demonstrations[number].state(skill.state_channels) for number in skill.train_demos])
+    proof, certificate = prove(certificate, skill.field, known, config.evaluation)
+    among = judge_among_obstacles(skill, demonstrations, config.obstacle, config.evaluation, config.solver)
+    evaluation = combine([evaluation, proof, among])
 
     write_json(run.folder / "scores.json", evaluation.document(config.evaluation.protocol.value, demonstrations.name))
     with atomic(run.folder / "evaluation.npz") as temporary:
         np.savez_compressed(temporary, allow_pickle=False, **evaluation.arrays)
     certificate["audit"] = audit(evaluation)
+    if among.scores:
+        certificate["obstacles"] = certificate_part(among)
     write_json(run.folder / "certificate.json", certificate)
     run.log_scores(evaluation.scores)
     save_all(evaluation.arrays, certificate, run.folder / "figures")
@@ -120,7 +131,7 @@ def compute(
     return combine(
         [
             judge_reproduction([*trained, *heldout], state_unit(skill.state_channels)),
-            _contraction(field, scene, settings),
+            _contraction(field, scene, settings, proven_rate),
             _region(field, scene, settings),
             _nearby(field, scene, settings, proven_rate),
             _goal(field, scene, settings, skill.goal.double().numpy()),
@@ -131,7 +142,7 @@ def compute(
 
 def audit(evaluation: Evaluation) -> dict[str, Any]:
     """Measured numbers that bear on the claim of a certificate, under the names of their scores."""
-    bearing = ("contraction.", "nearby.claimed.")
+    bearing = ("contraction.", "nearby.claimed.", "verification.")
     return {name: score.as_dict()["value"] for name, score in evaluation.scores.items() if name.startswith(bearing)}
 
 
@@ -184,14 +195,18 @@ def _judged(field: ArrayField, demonstration: Trajectory, skill: Skill, is_train
     states = demonstration.state(skill.state_channels)
     time_s = demonstration.time_s - demonstration.time_s[0]
     velocities = demonstration.velocity(skill.state_channels)
-    return Judged(time_s, states, velocities, field.roll(states[:1], time_s)[0], field.velocity(states), is_trained)
+    predicted = field.velocity(states, time_s)
+    return Judged(time_s, states, velocities, field.roll(states[:1], time_s)[0], predicted, is_trained)
 
 
-def _contraction(field: ArrayField, scene: Scene, settings: EvaluationConfig) -> Evaluation:
+def _contraction(field: ArrayField, scene: Scene, settings: EvaluationConfig, proven_rate: float | None) -> Evaluation:
     grid = sample_box(scene.box, settings.contraction_grid_points, settings.seed)
-    measured = judge_contraction(field.field, field.tensor(grid.points), grid.note)
+    points = field.tensor(grid.points)
     place = {"grid_points": grid.points, "grid_shape": np.array(grid.shape, dtype=int)}
-    return combine([Evaluation(arrays=place), measured])
+    parts = [Evaluation(arrays=place), judge_contraction(field.field, points, grid.note)]
+    if proven_rate is not None:
+        parts.append(judge_condition(field.field, points, proven_rate, grid.note))
+    return combine(parts)
 
 
 def _region(field: ArrayField, scene: Scene, settings: EvaluationConfig) -> Evaluation:

@@ -3,16 +3,20 @@
 from typing import Any
 
 from geomotion.config import DatasetConfig, NcdsConfig
+from geomotion.figures.report.conditions import condition_rows
+from geomotion.figures.studies.fields import FIELD_STUDY_FIGURES
 from geomotion.files import read_json
 from geomotion.models import ModelConfig
 from geomotion.stages import compare, shared
-from geomotion.stages.evaluate import EvaluateConfig, evaluate, scores_table
+from geomotion.stages.evaluate import EvaluateConfig, scores_table
+from geomotion.stages.evaluate_conditions import evaluate
 from geomotion.stages.export import ExportConfig, export
 from geomotion.stages.ingest import ingest
 from geomotion.stages.report import ReportConfig, report
 from geomotion.stages.rollout import RolloutStageConfig, rollout, rollout_table
 from geomotion.stages.session import Program, Session, Step, VerbResult
 from geomotion.stages.train import TrainConfig, train
+from geomotion.tables import aligned
 from geomotion.tracking import Stage
 
 
@@ -24,7 +28,7 @@ def _train_config(session: Session) -> TrainConfig:
         selection=DatasetConfig(
             dataset.name, dataset.state_channels, dataset.train_demos, dataset.test_demos, dataset.held_out
         ),
-        model=ModelConfig(config.chart, config.field, config.regulariser, config.seed),
+        model=ModelConfig(config.chart, config.field, config.regulariser, config.seed, config.time_law),
         training=config.training,
         seed=config.seed,
     )
@@ -35,7 +39,7 @@ def _rollout_config(session: Session) -> RolloutStageConfig:
 
 
 def _evaluate_config(session: Session) -> EvaluateConfig:
-    return EvaluateConfig(session.config.evaluation, session.config.solver)
+    return EvaluateConfig(session.config.evaluation, session.config.solver, session.config.obstacle)
 
 
 def _export_config(session: Session) -> ExportConfig:
@@ -74,7 +78,8 @@ def _evaluate(session: Session) -> VerbResult:
     found = session.produce("evaluate")
     scores = read_json(found.path("scores.json"))
     certificate = read_json(found.path("certificate.json"))
-    text = f"{scores_table(scores)}\n\n{_certificate_line(certificate)}\nscores  {found.path('scores.json')}"
+    each = f"\n\n{aligned(condition_rows(scores['conditions']))}" if "conditions" in scores else ""
+    text = f"{scores_table(scores)}{each}\n\n{_certificate_line(certificate)}\nscores  {found.path('scores.json')}"
     return VerbResult(
         text, session.document(scores=scores, certificate=certificate), objective=compare.objective(scores)
     )
@@ -106,4 +111,5 @@ NCDS = Program(
         "check": shared.check_verb,
     },
     execution_keys=shared.EXECUTION_KEYS | {"solver", "rollout"},
+    study_figures=FIELD_STUDY_FIGURES,
 )

@@ -9,6 +9,7 @@ from omegaconf import OmegaConf
 
 from geomotion.errors import CorruptArtefact
 from geomotion.figures.arrays import EvaluationArrays, read_evaluation
+from geomotion.figures.report.conditions import condition_rows
 from geomotion.figures.report.ncds_caveats import caveats
 from geomotion.figures.report.ncds_pictures import CAPTIONS, missing
 from geomotion.figures.report.ncds_scores import FIELD, headlines
@@ -71,7 +72,7 @@ def compose(config: ReportConfig, inputs: Mapping[str, Artefacts]) -> Page:
         origin=origin(config.command, inputs, STAGES),
         caveats=caveats(data, str(certificate.get("claim")), str(judged["protocol"])),
         omitted=missing(shown, data) | _omitted(judged, inputs),
-        listings=_rollouts(inputs),
+        listings=(*_conditions(judged), *_rollouts(inputs)),
     )
 
 
@@ -136,6 +137,15 @@ def _policy_facts(inputs: Mapping[str, Artefacts]) -> dict[str, str]:
     policy: Document = read_json(inputs["export"].path("policy.json"))
     differs = f"at most {policy['max_difference_to_torch_m_per_s']:.1g} m/s from the trained one"
     return {"Exported policy": f"ONNX, {policy['query_time_ms']:.2g} ms for one velocity, {differs}"}
+
+
+def _conditions(judged: Document) -> tuple[Listing, ...]:
+    """Scores under each condition, where there are several."""
+    if "conditions" not in judged:
+        return ()
+    head, *rows = condition_rows(judged["conditions"])
+    columns = (Column(head[0], is_text=True), *(Column(name) for name in head[1:]))
+    return (Listing("Conditions", columns, tuple(rows)),)
 
 
 def _rollouts(inputs: Mapping[str, Artefacts]) -> tuple[Listing, ...]:

@@ -1,33 +1,39 @@
 """Trajectories of a trained field that a robot can execute."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 import torch
 
-from geomotion import models
+from geomotion import conditional_models
+from geomotion.conditional_models import ConditionalSkill
 from geomotion.config import ObstacleConfig, RolloutConfig, SolverConfig
 from geomotion.demos import storage
 from geomotion.demos.demonstrations import VELOCITY_OF, Demonstrations, Trajectory
-from geomotion.dynamics.rollout import Rollout, RolloutStatus
-from geomotion.dynamics.rollout import rollout as follow
+from geomotion.dynamics.rollout import RolloutStatus
 from geomotion.errors import InvalidSetting
+from geomotion.figures.arrays import Flow
 from geomotion.figures.rollouts import PlanarRollouts, figure_rollouts
 from geomotion.figures.style import save_figure
 from geomotion.files import write_json
 from geomotion.models import Skill
-from geomotion.obstacles.modulation import ModulatedField
-from geomotion.obstacles.obstacle import clearance, surface_points
-from geomotion.obstacles.rollout import rollout_among_obstacles
-from geomotion.stages.scene import modulated
+from geomotion.obstacles.obstacle import surface_points
+from geomotion.scores.grids import bounding_box, sample_box
+from geomotion.stages.phases import Followed, Phase, Start, follow_phases, phases
 from geomotion.tables import aligned
 from geomotion.tracking import Artefacts, StageRun
 
-GOAL_TOLERANCE = 0.02  # of the size of the demonstrations
 OUTLINE_POINTS = 200
+CORNER = "corner"
+CORNER_MARGIN = 0.2  # of the box around the demonstrations
+CORNER_DURATIONS = 3.0  # as long as the first rollout: corners are farther from the goal
+FLOW_POINTS_PER_AXIS = 40
+FLOW_MARGIN = 0.05
+Outcome = tuple[Start, list[Phase], Followed]
 
 
 @dataclass(frozen=True)
@@ -39,32 +45,30 @@ class RolloutStageConfig:
     obstacle: ObstacleConfig
 
 
-@dataclass(frozen=True)
-class Start:
-    """Where one rollout begins and at which times it is wanted."""
-
-    label: str
-    state: np.ndarray
-    times: np.ndarray
-
-
 def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
     """Write ``rollouts/`` (trajectories in the layout of demonstrations) and ``rollouts.json`` (how each one ended).
 
     With obstacles, the modulated field is followed; where obstacles move, each rollout begins when they are where the
-    configuration puts them. Rollouts in a plane are drawn, ``figures/rollouts``.
+    configuration puts them. A skill with conditions is followed under the condition of the configuration, or else of
+    the demonstration; the condition may change on the way. Rollouts in a plane are drawn, ``figures/rollouts``.
 
     Raises:
-        InvalidSetting: If starts or obstacles do not fit the skill.
+        InvalidSetting: If starts, conditions or obstacles do not fit the skill.
     """
-    skill = models.load(inputs["train"].path("model.pt"))
+    skill = conditional_models.load(inputs["train"].path("model.pt"))
     demonstrations = storage.load(inputs["ingest"].folder)
     starts = _starts(config.rollout, demonstrations, skill)
-    field = modulated(config.obstacle, skill)
-    outcomes = [_follow(skill, field, start, config.solver) for start in starts]
-    pairs = zip(starts, outcomes, strict=True)
+    planned = {
+        condition: phases(config.rollout, config.obstacle, skill, condition)
+        for condition in dict.fromkeys(start.condition for start in starts)
+    }
+    followed = [
+        (start, planned[start.condition], follow_phases(planned[start.condition], start, config.solver))
+        for start in starts
+    ]
+    channel = _channels(skill)[0]
     trajectories = tuple(
-        found for start, outcome in pairs if (found := _trajectory(skill, field, start, outcome)) is not None
+        found for start, _, outcome in followed if (found := _trajectory(channel, start, outcome)) is not None
     )
     if not trajectories:
         labels = ", ".join(start.label for start in starts)
@@ -74,14 +78,16 @@ def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: St
             demonstrations,
             name=f"{demonstrations.name}/rollouts",
             trajectories=trajectories,
-            space=f"R{skill.field.dim}",
+            space=f"R{len(starts[0].state)}",
+            condition_names=(),  # conditions may change on the way; rollouts.json has them
             source=f"computed by a field learned from {demonstrations.name}; {demonstrations.source}",
         ),
         run.folder / "rollouts",
     )
-    write_json(run.folder / "rollouts.json", _document(skill, field, starts, outcomes))
-    if skill.field.dim == 2:
-        picture = _picture(skill, field, demonstrations, trajectories)
+    write_json(run.folder / "rollouts.json", {"rollouts": [_row(*one) for one in followed]})
+    if len(starts[0].state) == 2:
+        demonstrated = [one.state(_channels(skill)) for one in demonstrations.trajectories]
+        picture = _picture(followed, demonstrated, [(one.label, one.channels[channel]) for one in trajectories])
         save_figure(figure_rollouts(picture), run.folder / "figures", "rollouts", picture.arrays())
 
 
@@ -96,14 +102,30 @@ def rollout_table(document: Mapping[str, Any]) -> str:
     return aligned(rows)
 
 
-def _starts(config: RolloutConfig, demonstrations: Demonstrations, skill: Skill) -> list[Start]:
+def _channels(skill: Skill | ConditionalSkill) -> tuple[str, ...]:
+    return skill.state_channels if isinstance(skill, Skill) else skill.augmented.state_channels
+
+
+def _starts(config: RolloutConfig, demonstrations: Demonstrations, skill: Skill | ConditionalSkill) -> list[Start]:
+    starts = _chosen_starts(config, demonstrations, skill)
+    if not config.corners:
+        return starts
+    channels = _channels(skill)
+    box = bounding_box([one.state(channels) for one in demonstrations.trajectories]).enlarged(CORNER_MARGIN)
+    corners = [np.array(corner) for corner in product(*zip(box.lower, box.upper, strict=True))]
+    duration_s = config.duration_s or CORNER_DURATIONS * float(starts[0].times[-1])
+    times, condition = np.linspace(0.0, duration_s, len(starts[0].times)), starts[0].condition
+    return [*starts, *(Start(f"{CORNER} {number}", one, times, condition) for number, one in enumerate(corners))]
+
+
+def _chosen_starts(
+    config: RolloutConfig, demonstrations: Demonstrations, skill: Skill | ConditionalSkill
+) -> list[Start]:
     if config.starts_m is not None:
-        duration = config.duration_s or skill.geometry.duration_s
-        times = np.linspace(0.0, duration, config.points or 1000)
-        return [
-            Start(f"start {number}", _state(start, skill.field.dim), times)
-            for number, start in enumerate(config.starts_m)
-        ]
+        plain = skill if isinstance(skill, Skill) else skill.augmented
+        dim = plain.field.dim - plain.geometry.context
+        times = np.linspace(0.0, config.duration_s or plain.geometry.duration_s, config.points or 1000)
+        return [Start(f"start {number}", _state(start, dim), times) for number, start in enumerate(config.starts_m)]
     chosen = demonstrations.select(config.demos if config.demos is not None else range(len(demonstrations)))
     numbers = config.demos if config.demos is not None else range(len(demonstrations))
     starts = []
@@ -111,7 +133,7 @@ def _starts(config: RolloutConfig, demonstrations: Demonstrations, skill: Skill)
         times = one.time_s - one.time_s[0]
         if config.duration_s is not None or config.points is not None:
             times = np.linspace(0.0, config.duration_s or one.duration_s, config.points or len(one))
-        starts.append(Start(f"demonstration {number}", one.state(skill.state_channels)[0], times))
+        starts.append(Start(f"demonstration {number}", one.state(_channels(skill))[0], times, one.condition))
     return starts
 
 
@@ -121,88 +143,67 @@ def _state(start: list[float], dim: int) -> np.ndarray:
     return np.asarray(start, dtype=float)
 
 
-def _follow(skill: Skill, field: ModulatedField | None, start: Start, solver: SolverConfig) -> Rollout:
-    dtype = skill.goal.dtype
-    state, times = torch.as_tensor(start.state, dtype=dtype)[None], torch.as_tensor(start.times, dtype=dtype)
-    options: dict[str, Any] = {
-        "method": solver.method.value,
-        "substeps": solver.substeps,
-        "relative_tolerance": solver.relative_tolerance,
-        "absolute_tolerance": solver.absolute_tolerance,
-        "goal": skill.goal,
-        "goal_tolerance": GOAL_TOLERANCE * 2 * skill.geometry.scale_m,
-    }
-    if field is None:
-        return follow(skill.field, state, times, **options)
-    return rollout_among_obstacles(field, state, times, **options)
-
-
-def _trajectory(skill: Skill, field: ModulatedField | None, start: Start, outcome: Rollout) -> Trajectory | None:
+def _trajectory(channel: str, start: Start, outcome: Followed) -> Trajectory | None:
     """What a robot can execute of a rollout: all points before the first that is not finite, if they are two."""
-    states = outcome.states[0]
-    with torch.no_grad():
-        if field is None:
-            velocities = skill.field(states)
-        else:
-            velocities = field.velocity(states, torch.as_tensor(start.times).to(states)[:, None])
-    is_finite = torch.cat([states, velocities], dim=-1).isfinite().all(dim=-1)
+    is_finite = torch.cat([outcome.states, outcome.velocities], dim=-1).isfinite().all(dim=-1)
     points = int(is_finite.int().cumprod(0).sum())
     if points < 2:
         return None
-    states, velocities = states[:points], velocities[:points]
-    channel = skill.state_channels[0]
-    return Trajectory(
-        start.times[:points],
-        {channel: states.double().numpy(), VELOCITY_OF[channel]: velocities.double().numpy()},
-        start.label,
-    )
-
-
-def _clearance(field: ModulatedField | None, start: Start, outcome: Rollout) -> float | None:
-    """Smallest distance to an obstacle at the output times [m], negative inside."""
-    if field is None:
-        return None
-    states = outcome.states[0]
-    found = float(clearance(field.obstacles, states, torch.as_tensor(start.times).to(states)))
-    return found if math.isfinite(found) else None
+    states, velocities = (values[:points].double().numpy() for values in (outcome.states, outcome.velocities))
+    return Trajectory(start.times[:points], {channel: states, VELOCITY_OF[channel]: velocities}, start.label)
 
 
 def _picture(
-    skill: Skill, field: ModulatedField | None, demonstrations: Demonstrations, rollouts: tuple[Trajectory, ...]
+    followed: Sequence[Outcome], demonstrated: list[np.ndarray], rollouts: list[tuple[str, np.ndarray]]
 ) -> PlanarRollouts:
-    angles = torch.linspace(0, 2 * torch.pi, OUTLINE_POINTS + 1).to(skill.goal)
+    _, (first, *_), _ = followed[0]
+    field, goal = first.field, first.skill.goal
+    angles = torch.linspace(0, 2 * torch.pi, OUTLINE_POINTS + 1).to(goal)
     around = torch.stack([angles.cos(), angles.sin()], dim=-1)
     obstacles = () if field is None else field.obstacles
     outlines = [surface_points(obstacle, around).double().numpy() for obstacle in obstacles]
-    duration = max(rollout.duration_s for rollout in rollouts)
+    duration = max(float(start.times[-1]) for start, _, _ in followed)
     ways = [duration * obstacle.velocity.double().numpy() for obstacle in obstacles]
+    goals = {phase.skill.geometry.goal for _, all_phases, _ in followed for phase in all_phases}
     return PlanarRollouts(
-        [one.state(skill.state_channels) for one in demonstrations.trajectories],
-        [one.channels[skill.state_channels[0]] for one in rollouts],
+        demonstrated,
+        [path for label, path in rollouts if not label.startswith(CORNER)],
         outlines,
         [outline + way for outline, way in zip(outlines, ways, strict=True)],
-        np.asarray(skill.geometry.goal),
+        np.array(sorted(goals)),
+        [path for label, path in rollouts if label.startswith(CORNER)],
+        _flow(first, [*demonstrated, *(path for _, path in rollouts)]) if len(goals) == 1 else None,
     )
 
 
-def _document(
-    skill: Skill, field: ModulatedField | None, starts: list[Start], outcomes: list[Rollout]
-) -> dict[str, Any]:
-    rows = []
-    for start, outcome in zip(starts, outcomes, strict=True):
-        distance = float((outcome.states[0, -1] - skill.goal).norm())
-        rows.append(
-            {
-                "start": start.label,
-                "duration_s": float(start.times[-1]),
-                "points": len(start.times),
-                "status": outcome.statuses[0].name,
-                "outcome": outcome.statuses[0].value,
-                "distance_to_goal_m": distance if math.isfinite(distance) else None,
-                "reached_goal": outcome.statuses[0] is RolloutStatus.reached,
-                "clearance_m": _clearance(field, start, outcome),
-                "method": outcome.method,
-                "note": outcome.note,
-            }
-        )
-    return {"goal_m": list(skill.geometry.goal), "rollouts": rows}
+@torch.no_grad()
+def _flow(phase: Phase, paths: Sequence[np.ndarray]) -> Flow:
+    """Velocities on a grid around everything that is drawn, where obstacles are at first; NaN inside of them."""
+    points = sample_box(bounding_box(paths).enlarged(FLOW_MARGIN), FLOW_POINTS_PER_AXIS, seed=0).points
+    states = torch.as_tensor(points, dtype=phase.skill.goal.dtype)
+    if phase.field is None:
+        return Flow(points, phase.skill.field(states).double().numpy())
+    velocity = phase.field(states).double().numpy()
+    covered = torch.stack([obstacle.level(states) < 1 for obstacle in phase.field.obstacles]).any(dim=0).numpy()
+    return Flow(points, np.where(covered[:, None], np.nan, velocity))
+
+
+def _row(start: Start, all_phases: list[Phase], outcome: Followed) -> dict[str, Any]:
+    skill = all_phases[-1].skill
+    distance = float((outcome.states[-1] - skill.goal).norm())
+    row = {
+        "start": start.label,
+        "duration_s": float(start.times[-1]),
+        "points": len(start.times),
+        "goal_m": list(skill.geometry.goal),
+        "status": outcome.status.name,
+        "outcome": outcome.status.value,
+        "distance_to_goal_m": distance if math.isfinite(distance) else None,
+        "reached_goal": outcome.status is RolloutStatus.reached,
+        "clearance_m": outcome.clearance_m,
+        "method": outcome.method,
+        "note": outcome.note,
+    }
+    if not all_phases[0].condition:
+        return row
+    return row | {"condition": list(all_phases[0].condition), "switches": list(outcome.changes)}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,13 @@ from geomotion import config as schema
 from geomotion.errors import InvalidSetting
 from geomotion.models import Skill
 from geomotion.obstacles.body import Body
+from geomotion.obstacles.boundary import Boundary
+from geomotion.obstacles.enclosure import enclose
 from geomotion.obstacles.modulation import ModulatedField
 from geomotion.obstacles.motion import ConstantVelocity, Motion, MovingBody, Waypoints
-from geomotion.obstacles.obstacle import Obstacle
+from geomotion.obstacles.obstacle import Obstacle, overlap
 from geomotion.obstacles.solids import Box, Ellipsoid, Sphere
-from geomotion.obstacles_files import Placement, load_mesh, load_point_cloud
+from geomotion.obstacles_files import Placement, load_mesh, load_point_cloud, load_triangles
 from geomotion.types import Float, Tensor
 
 SHARP = 0.01  # rounding of edges, of the shortest side
@@ -32,16 +35,43 @@ def modulated(config: schema.ObstacleConfig, skill: Skill) -> ModulatedField | N
     bodies = solids(config)
     if not isinstance(config, schema.Avoidance) or not bodies:
         return None
-    for body in bodies:
-        if isinstance(body, schema.MeshObstacle | schema.PointCloudObstacle) or body.path_m is not None:
-            raise InvalidSetting(
-                "obstacle", _kind(body), "a sphere, ellipsoid or box with constant velocity: fields go around those"
-            )
-    obstacles = [obstacle for body in bodies if isinstance(obstacle := build_obstacle(body, skill.goal), Obstacle)]
+    obstacles = [_avoidable(body, skill.goal) for body in bodies]
     for body, obstacle in zip(bodies, obstacles, strict=True):
         if float(obstacle.level(skill.goal)) < 1 and not bool(obstacle.velocity.any()):
             raise InvalidSetting("obstacle.centre_m", body.centre_m, "an obstacle that leaves the goal free")
-    return ModulatedField(skill.field, obstacles, config.reactivity, config.escape, config.recovery_time_s)
+    _refuse_overlaps(obstacles)
+    return ModulatedField(skill.field, obstacles, config.reactivity, config.escape, config.recovery_time_s, config.hold)
+
+
+def _avoidable(config: schema.SolidObstacle, like: Float[Tensor, " D"]) -> Obstacle:
+    """An obstacle that fields go around."""
+    if isinstance(config, schema.PointCloudObstacle) or config.path_m is not None:
+        expected = "a body with a surface, at rest or with constant velocity: fields go around those"
+        raise InvalidSetting("obstacle", _kind(config), expected)
+    if isinstance(config, schema.MeshObstacle):
+        _require_dimension(config, 3, len(like))
+        vertices, faces = load_triangles(Path(config.file))
+        boundary = Boundary.of_mesh(_placement(config).apply(vertices), faces)
+        velocity = _velocity(config, like)
+        return enclose(boundary, config.rounding_m, config.convex_hull, velocity).to(like)
+    body = build_obstacle(config, like)
+    assert isinstance(body, Obstacle)
+    return body
+
+
+def _refuse_overlaps(obstacles: Sequence[Obstacle]) -> None:
+    """Where two surfaces meet, a state on one is carried into the other.
+
+    Raises:
+        InvalidSetting: If two obstacles overlap at time zero.
+    """
+    for one, other in permutations(range(len(obstacles)), 2):
+        if overlap(obstacles[one], obstacles[other]):
+            raise InvalidSetting(
+                "obstacle.bodies",
+                f"number {one + 1} and {other + 1} of {len(obstacles)} overlap",
+                "bodies apart from each other; make those that belong together one, as a star-shaped polygon or mesh",
+            )
 
 
 def solids(config: schema.ObstacleConfig) -> list[schema.SolidObstacle]:
@@ -107,7 +137,7 @@ def build_obstacle(config: schema.SolidObstacle, like: Float[Tensor, " D"]) -> B
     """
     dim = len(like)
     centre = _vector("centre_m", config.centre_m, like)
-    velocity = None if config.velocity_m_per_s is None else _vector("velocity_m_per_s", config.velocity_m_per_s, like)
+    velocity = _velocity(config, like)
     match config:
         case schema.SphereObstacle():
             return Sphere(centre, float(config.radius_m), velocity)
@@ -118,6 +148,12 @@ def build_obstacle(config: schema.SolidObstacle, like: Float[Tensor, " D"]) -> B
             _vector("sides_m", config.sides_m, like)
             rounding = config.rounding_m if config.rounding_m is not None else min(config.sides_m) / 4
             return Box(centre, config.sides_m, rounding, _rotation(config.rotation_rad, dim), velocity)
+        case schema.PolygonObstacle():
+            _require_dimension(config, 2, dim)
+            turn = _rotation(config.rotation_rad, dim)
+            corners = np.array(config.vertices_m, dtype=float) @ (np.eye(2) if turn is None else turn.numpy().T)
+            boundary = Boundary.of_polygon(corners + np.array(config.centre_m))
+            return enclose(boundary, config.rounding_m, config.convex_hull, velocity).to(like)
         case schema.MeshObstacle() | schema.PointCloudObstacle():
             return _from_file(config, dim)
         case unknown:
@@ -125,16 +161,28 @@ def build_obstacle(config: schema.SolidObstacle, like: Float[Tensor, " D"]) -> B
 
 
 def _from_file(config: schema.MeshObstacle | schema.PointCloudObstacle, dim: int) -> Body:
-    if dim != 3:
-        raise InvalidSetting("obstacle", _kind(config), "a sphere, ellipsoid or box: files hold bodies in space")
+    _require_dimension(config, 3, dim)
+    if isinstance(config, schema.MeshObstacle):
+        return load_mesh(Path(config.file), _placement(config))
+    return load_point_cloud(Path(config.file), config.radius_m, _placement(config))
+
+
+def _placement(config: schema.MeshObstacle | schema.PointCloudObstacle) -> Placement:
     turn: Sequence[float] = config.rotation_rad if config.rotation_rad is not None else (0.0, 0.0, 0.0)
     if len(turn) != 3:
         raise InvalidSetting("obstacle.rotation_rad", turn, "three numbers, a rotation vector")
     place = tuple(float(value) for value in config.centre_m)
-    placement = Placement(config.scale, (turn[0], turn[1], turn[2]), (place[0], place[1], place[2]))
-    if isinstance(config, schema.MeshObstacle):
-        return load_mesh(Path(config.file), placement)
-    return load_point_cloud(Path(config.file), config.radius_m, placement)
+    return Placement(config.scale, (turn[0], turn[1], turn[2]), (place[0], place[1], place[2]))
+
+
+def _require_dimension(config: schema.SolidObstacle, needed: int, dim: int) -> None:
+    if dim != needed:
+        expected = f"a sphere, ellipsoid or box: it has {needed} coordinates, the state {dim}"
+        raise InvalidSetting("obstacle", _kind(config), expected)
+
+
+def _velocity(config: schema.SolidObstacle, like: Float[Tensor, " D"]) -> Float[Tensor, " D"] | None:
+    return None if config.velocity_m_per_s is None else _vector("velocity_m_per_s", config.velocity_m_per_s, like)
 
 
 def files(config: schema.ObstacleConfig) -> list[Path]:

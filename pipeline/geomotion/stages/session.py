@@ -10,9 +10,11 @@ from typing import Any
 
 from geomotion.config import CommandConfig
 from geomotion.errors import InvalidSetting, MissingRun
+from geomotion.figures.studies.panels import DrawStudy
 from geomotion.tracking import Artefacts, Stage, Tracker, store
 from geomotion.tracking.tracker import CommandRun
 
+WITHOUT_EFFECT = ("reuse", "output", "run", "study.jobs")  # on what a run computes
 TRAINED_BY = "mlflow.source.name"  # tag with program and verb
 
 
@@ -52,6 +54,7 @@ class Program:
         verbs: What each verb does.
         execution_keys: Settings that may be given beside ``run=``, whose training is finished.
         check: Refuses a configuration that a late stage could not follow, before an early one has begun.
+        study_figures: Pictures that its studies can draw.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Program:
     verbs: Mapping[str, Callable[["Session"], VerbResult]]
     execution_keys: frozenset[str]
     check: Callable[[Any], None] = lambda config: None
+    study_figures: Mapping[str, DrawStudy] = field(default_factory=dict)
 
 
 @dataclass
@@ -70,6 +74,7 @@ class Session:
     command: CommandRun
     config: Any
     reproduction: str  # the command line that makes the trained run again
+    overrides: list[str]  # what was typed
     done: dict[str, Artefacts] = field(default_factory=dict)
 
     def produce(self, name: str) -> Artefacts:
@@ -82,17 +87,19 @@ class Session:
 
     def document(self, **content: Any) -> dict[str, Any]:
         """What every verb reports to programs, with the verb's own content."""
-        stages = {found.stage: {"run_id": found.run_id, "folder": str(found.folder)} for found in self.done.values()}
+        stages = places(self.done)
         return {"command": self.command.name, "run_id": self.command.run_id, "stages": stages, **content}
 
     def beside(self, run: str) -> "Session":
         """A session on another trained run, under the same command."""
-        return Session(self.program, self.tracker, self.command, self.config, "", _trained(self.tracker, run))
+        return Session(self.program, self.tracker, self.command, self.config, "", [], _trained(self.tracker, run))
 
 
 @contextmanager
-def open_session(program: Program, verb: str, config: CommandConfig, overrides: list[str]) -> Iterator[Session]:
-    """A session whose run ends with the block.
+def open_session(
+    program: Program, verb: str, config: CommandConfig, overrides: list[str], parent: CommandRun | None = None
+) -> Iterator[Session]:
+    """A session whose run ends with the block, alone or as part of the run of a study.
 
     Raises:
         MissingRun: If ``run=`` or ``runs=`` names nothing that this program trained.
@@ -111,10 +118,16 @@ def open_session(program: Program, verb: str, config: CommandConfig, overrides: 
     tracker = Tracker(config.tracking, config.reuse, program.name)
     done = _trained(tracker, config.run) if config.run is not None else {}
     typed = overrides if config.run is None else _trained_with(tracker, config.run) + overrides
-    kept = [item for item in typed if item.split("=")[0] not in ("reuse", "output", "run")]
-    with tracker.command(f"{program.name} {verb}", config, overrides) as command:
+    kept = [item for item in typed if item.split("=")[0] not in WITHOUT_EFFECT]
+    with tracker.command(f"{program.name} {verb}", config, overrides, parent) as command:
         tracker.link(command, done)
-        yield Session(program, tracker, command, config, shlex.join([program.name, "run", *kept]), done)
+        reproduction = shlex.join([program.name, "run", *kept])
+        yield Session(program, tracker, command, config, reproduction, overrides, done)
+
+
+def places(done: Mapping[str, Artefacts]) -> dict[str, dict[str, str]]:
+    """Run and folder of finished stages, for programs."""
+    return {found.stage: {"run_id": found.run_id, "folder": str(found.folder)} for found in done.values()}
 
 
 def log_to_standard_error() -> None:

@@ -73,21 +73,33 @@ class StageRun:
         entity = Dataset(name=name, digest=digest[:36], source_type="code", source=source)
         self._client.log_inputs(self.run_id, [DatasetInput(entity, [InputTag("mlflow.data.context", "training")])])
 
-    def log_policy(self, path: Path, dim: int, register_as: str | None) -> None:
-        """Log an exported field as an MLflow model, and register it if it has a name."""
+    def log_policy(self, path: Path, inputs: Mapping[str, int], register_as: str | None) -> None:
+        """Log an exported field as an MLflow model, and register it if it has a name.
+
+        Args:
+            path: The ONNX file.
+            inputs: How wide each of its inputs is, the state first, whose width is that of the velocity.
+            register_as: Name in the registry.
+        """
         import mlflow
         import numpy as np
         from mlflow.models import ModelSignature
-        from mlflow.types import Schema, TensorSpec
+        from mlflow.types import ColSpec, Schema, TensorSpec
 
-        tensors = Schema([TensorSpec(np.dtype(np.float32), (-1, dim))])
+        def tensor(width: int, name: str | None = None) -> TensorSpec:
+            return TensorSpec(np.dtype(np.float32), (-1, width), name)
+
+        state, *others = inputs.values()
+        named: list[ColSpec | TensorSpec] = [tensor(state)]
+        if others:
+            named = [tensor(width, name) for name, width in inputs.items()]
         with held_signals(), mlflow.start_run(run_id=self.run_id), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             mlflow.pyfunc.log_model(
                 name="policy",
                 python_model=str(Path(__file__).parents[1] / "policy_model.py"),
                 artifacts={"policy": str(path)},
-                signature=ModelSignature(tensors, tensors),
+                signature=ModelSignature(Schema(named), Schema([tensor(state)])),
                 pip_requirements=["onnxruntime", "numpy", "mlflow"],
                 registered_model_name=register_as,
             )

@@ -67,9 +67,13 @@ class Tracker:
             self.work.mkdir(parents=True, exist_ok=True)
 
     @contextmanager
-    def command(self, name: str, config: object, overrides: list[str]) -> Iterator[CommandRun]:
-        """The run of a whole command; failed or killed if the block raises."""
+    def command(
+        self, name: str, config: object, overrides: list[str], parent: CommandRun | None = None
+    ) -> Iterator[CommandRun]:
+        """The run of a whole command, alone or as part of another; failed or killed if the block raises."""
         tags = {COMMAND: name, OVERRIDES: shlex.join(overrides), "mlflow.source.name": name}
+        if parent is not None:
+            tags[PARENT] = parent.run_id
         tags["mlflow.note.content"] = f"`{shlex.join([*name.split(), *overrides])}`"
         run_id = self._create(name, tags)
         with store.store_errors(self.uri):
@@ -207,9 +211,9 @@ class Tracker:
 
     def overrides(self, run: str) -> list[str]:
         """What was typed after the verb of the command that a run belongs to."""
-        found = self._resolve(run)
-        parent = found.data.tags.get(PARENT)
-        tags = self.client.get_run(parent).data.tags if parent else found.data.tags
+        tags = self._resolve(run).data.tags
+        if COMMAND not in tags and PARENT in tags:  # a stage
+            tags = self.client.get_run(tags[PARENT]).data.tags
         return shlex.split(tags.get(OVERRIDES, ""))
 
     def _resolve(self, run: str) -> "Run":

@@ -77,6 +77,7 @@ class Geometry:
         mean: Mean of all states [m].
         goal: Mean of the last states [m].
         duration_s: Mean duration [s].
+        context: How many of the last coordinates of a state stand still: the code of its condition.
     """
 
     centre: tuple[float, ...]
@@ -84,6 +85,7 @@ class Geometry:
     mean: tuple[float, ...]
     goal: tuple[float, ...]
     duration_s: float
+    context: int = 0
 
     @classmethod
     def of(cls, data: TrainingSet) -> "Geometry":

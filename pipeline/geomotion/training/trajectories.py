@@ -29,14 +29,31 @@ class Curves:
         return self.times[row, index], self.states[row, index]
 
 
+@dataclass(frozen=True)
+class Samples:
+    """Where trajectories begin, and where they should be later; scaled, times in mean durations.
+
+    Attributes:
+        starts: Points of demonstrations.
+        begin: Times of `starts`.
+        times: Later times; the last one is that of the demonstration's end.
+        targets: Where the demonstrations are then.
+    """
+
+    starts: Float[Tensor, "demo start D"]
+    begin: Float[Tensor, "demo start"]
+    times: Float[Tensor, "demo start time"]
+    targets: Float[Tensor, "demo start time D"]
+
+
 class TrajectoryReproduction:
     """Distance between demonstrations and trajectories from their own states, at equal times and as curves.
 
     Each step draws starts on the demonstrations, the first of them their beginnings, and times after each. Half of the
     starts lie on mixtures of two similar demonstrations, x_i + λ (x_j - x_i), which stand for the repetitions that a
-    person did not show: without them the field learns the starts of the training set by heart. After a warm-up, the
-    nearest-point term compares whole curves, which lets the shape count more than the timing. Beside the
-    demonstrations, where nothing is known, haste can be held against the field.
+    person did not show, and a little beside them: without these the field learns the starts of the training set by
+    heart. After a warm-up, the nearest-point term compares whole curves, which lets the shape count more than the
+    timing. Beside the demonstrations, where nothing is known, haste is held against the field.
 
     Args:
         data: Demonstrations.
@@ -53,6 +70,9 @@ class TrajectoryReproduction:
         self.partners = nearest_curves(self.curves.states, MIXING_PARTNERS)
         self.curve_stride = min(settings.curve_stride, self.curves.times.shape[1] // 2)  # a curve has two points
         self.states = data.all_states
+        self.times = torch.cat(data.times) / geometry.duration_s
+        self.start_noise = torch.full((self.states.shape[1],), settings.start_noise)
+        self.start_noise[len(self.start_noise) - geometry.context :] = 0  # a condition is known exactly
         self.velocities = data.all_velocities
         self.surroundings = Surroundings(data, settings.surroundings)
         self.top_speed = self.velocities.norm(dim=-1).max()
@@ -63,7 +83,8 @@ class TrajectoryReproduction:
         curve_term = progress >= settings.warm_up
         mixed = self._mix(generator)
         chosen = torch.randint(len(self.states), (settings.velocity_points,), generator=generator)
-        starts, elapsed, targets = self._samples(mixed, generator)
+        samples = self._samples(mixed, generator)
+        elapsed = model.progress(samples.times) - model.progress(samples.begin)[..., None]
         followed, first = self._followed(mixed, generator)
         curve_times = self._curve_times(followed, generator)
 
@@ -73,21 +94,27 @@ class TrajectoryReproduction:
         known = self.states[chosen]
         if settings.haste_weight > 0:
             known = torch.cat([known, self.surroundings.draw(settings.haste_points, generator)])
-        queried = torch.cat([known, self._to_metres(starts).flatten(0, 1), chart.anchor[None]])
+        queried = torch.cat([known, self._to_metres(samples.starts).flatten(0, 1), chart.anchor[None]])
         z, push_forward = chart.chart.linearise(queried)
         image = z[-1]
         velocities = push_forward(field(z - image))[: len(known)] / model.time_unit_s
-        latent_starts = (z[len(known) : -1] - image).view(starts.shape)
+        latent_starts = (z[len(known) : -1] - image).view(samples.starts.shape)
         paths = [field.solve(latent_starts, elapsed).flatten(0, 2)]
         if curve_term:
-            paths.append(field.solve(latent_starts[:, first], curve_times).flatten(0, 1))
+            paths.append(field.solve(latent_starts[:, first], model.progress(curve_times)).flatten(0, 1))
         x = self._from_metres(chart.chart.to_ambient(torch.cat(paths) + image))
 
-        error = (velocities[: len(chosen)] - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
-        equal_time = (x[: len(paths[0])].view(targets.shape) - targets).square().sum(-1).mean()
+        predicted = velocities[: len(chosen)] * model.speed(self.times[chosen])[:, None]
+        error = (predicted - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
+        distance = (x[: len(paths[0])].view(samples.targets.shape) - samples.targets).square().sum(-1)
+        equal_time = distance.mean()
         squares = [parameter.square().sum() for parameter in chart.parameters()]
         size = torch.stack(squares).sum() if squares else torch.zeros(())  # the identity has no parameters
-        losses = {"velocity": settings.velocity_weight * error, "weights": settings.weight_penalty * size}
+        losses = {
+            "velocity": settings.velocity_weight * error,
+            "weights": settings.weight_penalty * size,
+            "end": settings.end_weight * distance[..., -1].mean(),
+        }
         if settings.haste_weight > 0:
             losses["haste"] = settings.haste_weight * self._haste(velocities[len(chosen) :])
         if not curve_term:
@@ -132,8 +159,7 @@ class TrajectoryReproduction:
             curves.states + share[..., None] * (curves.states[other] - curves.states),
         )
 
-    def _samples(self, mixed: Curves, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
-        """Starts (demo, start, D), times since each (demo, start, time), and where the demonstrations are then."""
+    def _samples(self, mixed: Curves, generator: torch.Generator) -> Samples:
         demos, points, _ = self.curves.states.shape
         starts, half = self.settings.starts, self.settings.starts // 2
         begin = (torch.rand(demos, starts, generator=generator) * (points - 2)).long()
@@ -142,12 +168,15 @@ class TrajectoryReproduction:
         rest = (points - 1 - begin)[..., None]
         later = begin[..., None] + 1 + (share / self.settings.times * rest).long().clamp(max=points - 2)
         later = later.clamp(max=points - 1)
+        later[..., -1] = points - 1
         parts = []
         for curves, part in ((self.curves, slice(0, half)), (mixed, slice(half, None))):
             start_times, start_states = curves.at(begin[:, part])
-            times, states = curves.at(later[:, part])
-            parts.append((start_states, times - start_times[..., None], states))
-        return tuple(torch.cat(pair, 1) for pair in zip(*parts, strict=True))  # type: ignore[return-value]
+            parts.append((start_states, start_times, *curves.at(later[:, part])))
+        samples = Samples(*(torch.cat(pair, 1) for pair in zip(*parts, strict=True)))
+        beside = samples.starts[:, half:]
+        beside += self.start_noise * torch.randn(beside.shape, generator=generator)
+        return samples
 
     def _followed(self, mixed: Curves, generator: torch.Generator) -> tuple[Curves, int]:
         """Curves for the nearest-point term, and which start begins them: mixtures in every second step, on average."""

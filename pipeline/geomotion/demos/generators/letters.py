@@ -13,6 +13,7 @@ Source:
 import numpy as np
 
 from geomotion.config import LettersDataset
+from geomotion.demos.conditions import conditioned
 from geomotion.demos.demonstrations import Array, Demonstrations, Trajectory
 
 # Control polygons of the strokes, in units of the letter's height; the last point becomes the origin.
@@ -53,16 +54,24 @@ def generate(config: LettersDataset) -> Demonstrations:
 
     The same configuration gives the same demonstrations; a demonstration does not depend on how many follow it.
     """
-    stroke = _stroke(POLYGONS[config.letter])
-    generators = [np.random.default_rng((config.seed, number)) for number in range(config.demos)]
+    letters = [config.letter, *config.further_letters]
+    written = {letter: _write(letter, config) for letter in letters}
+    trajectories, condition_names = conditioned(written, config.condition, config.targets_m)
     return Demonstrations(
         name=config.name,
-        trajectories=tuple(_repeat(stroke, config, generator) for generator in generators),
+        trajectories=tuple(trajectories),
         space="R2",
         frame="drawing plane, origin at the target",
-        source=f"{SOURCE}; letter {config.letter}, seed {config.seed}",
+        source=f"{SOURCE}; letter {' + '.join(letters)}, seed {config.seed}",
         licence="MIT, as the program that made it",
+        condition_names=condition_names,
     )
+
+
+def _write(letter: str, config: LettersDataset) -> list[Trajectory]:
+    stroke = _stroke(POLYGONS[letter])
+    generators = [np.random.default_rng((config.seed, number)) for number in range(config.demos)]
+    return [_repeat(stroke, config, generator) for generator in generators]
 
 
 def _stroke(polygon: tuple[tuple[float, float], ...]) -> Array:

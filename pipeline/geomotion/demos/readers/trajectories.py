@@ -13,6 +13,7 @@ from geomotion.config import FolderDataset
 from geomotion.demos.columns import (
     ALL_COLUMNS,
     BOOKKEEPING_COLUMNS,
+    CONDITION,
     DEMO_COLUMNS,
     METRES_PER,
     RADIANS_PER,
@@ -31,10 +32,11 @@ JOINTS = "joints_rad"
 
 @dataclass(frozen=True)
 class Recording:
-    """What one file holds: demonstrations, and the names of their joints (empty where the file does not name them)."""
+    """What one file holds: demonstrations, and names of joints and conditions (empty where the file names none)."""
 
     trajectories: list[Trajectory]
     joint_names: tuple[str, ...]
+    condition_names: tuple[str, ...] = ()
 
 
 def recording_of(table: Table, path: Path, config: FolderDataset) -> Recording:
@@ -47,7 +49,7 @@ def recording_of(table: Table, path: Path, config: FolderDataset) -> Recording:
             time stamps.
 
     Raises:
-        DatasetError: If a column is unknown, doubled, missing or not numeric.
+        DatasetError: If a column is unknown, doubled, missing or not numeric, or a condition changes on the way.
     """
     known = {name: column for name in table if (column := _parse(name, config))}
     _refuse_unknown(path, set(table) - set(known) - {*TIME_COLUMNS, *DEMO_COLUMNS, *BOOKKEEPING_COLUMNS})
@@ -57,6 +59,9 @@ def recording_of(table: Table, path: Path, config: FolderDataset) -> Recording:
         channel: _channel(path, channel, table, known, config)
         for channel in dict.fromkeys(column.channel for column in known.values())
     }
+    conditions = channels.pop(CONDITION, None)
+    if not channels:
+        raise DatasetError(path, "holds conditions and nothing that moves; expected positions or joints beside them")
     _refuse_unpaired_velocities(path, known)
     demo_column = _only(path, table, DEMO_COLUMNS)
     time_column = _only(path, table, TIME_COLUMNS)
@@ -67,10 +72,26 @@ def recording_of(table: Table, path: Path, config: FolderDataset) -> Recording:
             time_s=_times(path, table, time_column, rows, config.sampling_rate_hz),
             channels={name: values[rows] for name, values in channels.items()},
             label=label,
+            condition=() if conditions is None else _constant(path, label, conditions[rows]),
         )
         for label, rows in groups
     ]
-    return Recording(trajectories, joint_names(column.axis for column in known.values() if column.channel == JOINTS))
+    joints, names = (
+        [column.axis for column in known.values() if column.channel == channel] for channel in (JOINTS, CONDITION)
+    )
+    return Recording(trajectories, joint_names(joints), tuple(sorted_axes(names)))
+
+
+def _constant(path: Path, label: str, conditions: Array) -> tuple[float, ...]:
+    """The condition of a demonstration, from one for each of its rows."""
+    differs = ~(conditions == conditions[0]).all(axis=1)
+    if differs.any():
+        row = int(np.flatnonzero(differs)[0])
+        found = f"{conditions[row].tolist()} after {conditions[0].tolist()}"
+        raise DatasetError(
+            path, f"demonstration {label}, row {row}: condition is {found}; expected one condition for all its rows"
+        )
+    return tuple(conditions[0].tolist())
 
 
 def _parse(name: str, config: FolderDataset) -> Column | None:

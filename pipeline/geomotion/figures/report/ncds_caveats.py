@@ -15,6 +15,10 @@ BY_CONSTRUCTION = (
     "The guarantee concerns trajectories of the field in exact arithmetic and in the learned metric. It says nothing "
     "about how well the demonstrations are reproduced."
 )
+BEYOND = {
+    "by_construction": "follows from the claim alone",
+    "verified_on_set": "follows from the claim inside the verified box, and is unknown outside",
+}
 REGION = "Steps inside the region depend on the grid of starts, the duration and the margin of the hull."
 
 
@@ -29,8 +33,8 @@ def caveats(data: EvaluationArrays, claim: str, protocol: str) -> list[str]:
     found = [PEERS if protocol == "peers" else _held_out(data)]
     if data.eigenvalues is not None:
         where = "on a grid" if data.eigenvalues.shape else "at random points"
-        beyond = "is unknown" if claim == "measured_only" else "follows from the claim alone"
         points = f"{len(data.eigenvalues.true)} points around the demonstrations"
+        beyond = BEYOND.get(claim, "is unknown")
         found.append(f"Contraction was sampled {where}: {points}. What happens between and beyond them {beyond}.")
     if claim == "by_construction":
         found.append(BY_CONSTRUCTION)

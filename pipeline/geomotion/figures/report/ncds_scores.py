@@ -29,11 +29,17 @@ LABELS = {
     "mean_rate": "Mean of the largest eigenvalue",
     "ratio": "Contraction ratio",
     "non_contracting_fraction": "Share of points that do not contract",
+    "margin": "Largest excess over the proven rate",
+    "contracting": "Share of the box proven to contract",
+    "not_contracting": "Share of the box proven not to contract",
+    "undecided": "Share of the box of which nothing is proven",
+    "witness": "Positive eigenvalue at one state, at least",
     "max_expansion": "Largest distance / initial distance",
     "final_ratio": "Final distance / initial distance",
     "growing_share": "Share of time steps in which the distance grows",
     "bound_excess": "Largest excess over the proven bound / initial distance",
     "never_reached": "Starts that never reach the goal",
+    "clearance": "Smallest distance to an obstacle",
 }
 FIELD = Subject("Reproduction of the demonstrations, from their own starts", REPRODUCTION, LABELS)
 

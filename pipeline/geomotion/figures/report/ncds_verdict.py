@@ -1,6 +1,7 @@
 """What is known about contraction, in sentences for people who want to run the motion on a robot."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import log
 from typing import Any
 
@@ -18,9 +19,16 @@ HEADLINES = {
     "measured_only": "No guarantee: contraction is measured only",
 }
 HOLDS = {
-    "by_construction": "from any two starts, whatever training found",
-    "verified_on_set": "from any two starts in the verified set",
+    "by_construction": "Two motions come together from any two starts, whatever training found",
+    "verified_on_set": "Two motions come together as long as both stay inside a box around the demonstrations",
 }
+PLAIN = {
+    "by_construction": "These are distances in the robot's own coordinates: a push is forgotten from its first moment.",
+    "verified_on_set": "Outside the box nothing is proven, and neither is that motions stay inside.",
+}
+LEARNED = ", in a metric that was learned with the motion,"
+SHARES = {"contracting": "contracting", "not contracting": "not_contracting", "undecided": "undecided"}  # of the box
+UNDISTORTED = 1 + 1e-3  # condition number of Dψ: the metric is the plain one
 
 
 def verdict(certificate: Certificate, grid: EigenvalueGrid | None) -> Verdict:
@@ -30,6 +38,13 @@ def verdict(certificate: Certificate, grid: EigenvalueGrid | None) -> Verdict:
         certificate: Contents of ``certificate.json``; absent entries are left out.
         grid: Measured eigenvalues, where there are any.
     """
+    found = _free_space(certificate, grid)
+    if obstacles := certificate.get("obstacles"):
+        return replace(found, sentences=(*found.sentences, _among_obstacles(obstacles["measured"])))
+    return found
+
+
+def _free_space(certificate: Certificate, grid: EigenvalueGrid | None) -> Verdict:
     claim, details = _claim(certificate), facts(certificate, grid)
     if claim == "measured_only":
         return Verdict("measured", HEADLINES[claim], _measured_sentences(grid), details)
@@ -63,6 +78,8 @@ def facts(certificate: Certificate, grid: EigenvalueGrid | None) -> tuple[tuple[
         found["Condition number of Dψ on demonstrated states"] = (
             f"{numbers}: bounds how far distances may grow at first"
         )
+    if attempt := _attempt(certificate):
+        found["Proof on the box around the demonstrations"] = attempt
     if grid is not None:
         found["Not contracting, robot coordinates"] = _measured(grid.true)
         found["Not contracting, claimed metric"] = _measured(grid.claimed)
@@ -75,6 +92,13 @@ def _claim(certificate: Certificate) -> str:
     claim = str(certificate.get("claim"))
     is_proven = claim in HOLDS and certificate.get("rate_per_s") is not None
     return claim if is_proven else "measured_only"
+
+
+def _attempt(certificate: Certificate) -> str:
+    """How far a proof got, where one was tried."""
+    audit = certificate.get("audit") or {}
+    shares = {name: audit.get(f"verification.{key}") for name, key in SHARES.items()}
+    return ", ".join(f"{name} {percent(share)}" for name, share in shares.items() if share is not None)
 
 
 def _measured(eigenvalues: Array) -> str:
@@ -100,13 +124,29 @@ def _measured_sentences(grid: EigenvalueGrid | None) -> tuple[str, ...]:
 
 def _proven_sentence(claim: str, certificate: Certificate) -> str:
     rate = float(certificate["rate_per_s"])
-    return (
-        f"Motions come together {HOLDS[claim]}: their distance, in a metric that was learned with the motion, halves "
-        f"at least every {log(2) / rate:.2g} s (rate {rate:.2g} 1/s)."
+    metric = LEARNED if _is_distorted(certificate) else ""
+    return f"{HOLDS[claim]}: their distance{metric} halves at least every {log(2) / rate:.2g} s (rate {rate:.2g} 1/s)."
+
+
+def _among_obstacles(measured: Mapping[str, float | None]) -> str:
+    """What obstacles leave of it."""
+    shares = (
+        ("obstacles.contraction.claimed.non_contracting_fraction", "of the points do not contract in that metric"),
+        ("obstacles.contraction.true.non_contracting_fraction", "not in the robot's coordinates"),
+        ("obstacles.passage.never_reached", "of the starts do not reach the goal"),
     )
+    known = [f"{percent(share)} {text}" for name, text in shares if (share := measured.get(name)) is not None]
+    return f"All this is about free space; among the obstacles it was measured: {', '.join(known)}."
+
+
+def _is_distorted(certificate: Certificate) -> bool:
+    overshoot = certificate.get("overshoot")
+    return not overshoot or max(overshoot.values()) > UNDISTORTED
 
 
 def _robot_coordinates_sentence(certificate: Certificate, grid: EigenvalueGrid | None) -> str:
+    if not _is_distorted(certificate):
+        return PLAIN[_claim(certificate)]
     parts = ["Measured in the robot's own coordinates, distances may grow before they shrink"]
     if overshoot := certificate.get("overshoot"):
         parts.append(f"at worst about {overshoot['worst']:.2g}-fold near the demonstrations")

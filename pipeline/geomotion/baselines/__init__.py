@@ -1,0 +1,1 @@
+"""Fields without any promise, which contracting ones are compared with."""

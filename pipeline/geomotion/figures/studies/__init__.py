@@ -1,0 +1,1 @@
+"""Pictures that show all variants of a study side by side."""

@@ -1,0 +1,107 @@
+"""The table of a study: scores of its cells, averaged over seeds, beside the numbers of others."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from statistics import fmean, pstdev
+from typing import Any
+
+from geomotion.config import ReferenceConfig, StudyConfig
+from geomotion.tables import aligned, markdown, number
+
+Document = Mapping[str, Any]
+Key = tuple[str, str]  # dataset and variant
+
+
+def table_document(study: StudyConfig, scores: Mapping[Key, Sequence[Document]], failures: list[str]) -> dict[str, Any]:
+    """The table as plain types.
+
+    Args:
+        study: Columns, rows and references.
+        scores: By dataset and variant: ``scores`` of every seed's ``scores.json``.
+        failures: What could not be run, and why.
+    """
+    names = [column.score for column in study.columns]
+    rows = []
+    for dataset in study.datasets:
+        for variant in study.variants:
+            found = scores.get((dataset, variant.label), [])
+            values = {name: _over_seeds([one.get(name) for one in found]) for name in names}
+            reference = reference_values(study.reference, dataset, variant.label)
+            rows.append({"dataset": dataset, "variant": variant.label, "values": values, "reference": reference})
+    return {
+        "title": study.title,
+        "seeds": list(study.seeds),
+        "columns": [
+            {"score": column.score, "title": column.title, "unit": _unit(column.score, scores)}
+            for column in study.columns
+        ],
+        "reference_source": study.reference.source if study.reference else None,
+        "reference_columns": list(study.reference.columns) if study.reference else [],
+        "rows": rows,
+        "notes": list(study.notes),
+        "failures": failures,
+    }
+
+
+def aligned_table(document: Document) -> str:
+    """For the terminal: title, table, legend, notes, failures."""
+    parts = [document["title"], aligned(list(lines(document))), "\n".join(legend(document))]
+    parts += ["\n".join(document["notes"]), "\n".join(f"failed: {failure}" for failure in document["failures"])]
+    return "\n\n".join(part for part in parts if part)
+
+
+def markdown_table(document: Document) -> str:
+    """The same for a page."""
+    listed = ["\n".join(f"- {line}" for line in legend(document)), "\n\n".join(document["notes"])]
+    parts = [f"**{document['title']}**", markdown(list(lines(document))), *listed]
+    parts += ["\n".join(f"- failed: {failure}" for failure in document["failures"])]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def lines(document: Document) -> Iterator[list[str]]:
+    """Head and rows as text. A dataset is named once; references stand last, where there are any."""
+    columns, others = document["columns"], []
+    if any(row["reference"] for row in document["rows"]):
+        others = [f"{document['reference_source']}: {name}" for name in document["reference_columns"]]
+    yield ["dataset", "variant", *(one["title"] for one in columns), *others]
+    before = None
+    for row in document["rows"]:
+        ours = [_cell(row["values"][one["score"]]) for one in columns]
+        theirs = [f"{value:g}" for value in row["reference"]] or ["–"] * len(others)
+        yield ["" if row["dataset"] == before else row["dataset"], row["variant"], *ours, *theirs[: len(others)]]
+        before = row["dataset"]
+
+
+def legend(document: Document) -> list[str]:
+    """What each column is."""
+    found = []
+    for one in document["columns"]:
+        unit = f" [{one['unit']}]" if one["unit"] not in (None, "1") else ""
+        found.append(f"{one['title']}: {one['score']}{unit}")
+    if len(document["seeds"]) > 1:
+        found.append(f"mean ± standard deviation over {len(document['seeds'])} seeds")
+    return found
+
+
+def reference_values(reference: ReferenceConfig | None, dataset: str, variant: str) -> list[float]:
+    """What others report of a variant on a dataset; empty if nothing."""
+    rows = reference.rows if reference is not None else []
+    return next((list(row.values) for row in rows if (row.dataset, row.variant) == (dataset, variant)), [])
+
+
+def _over_seeds(scores: Sequence[Document | None]) -> dict[str, Any] | None:
+    """Mean and standard deviation; None where no seed has the score, `mean` None where one is not finite."""
+    known = [score for score in scores if score is not None]
+    if not known:
+        return None
+    values = [score["value"] for score in known]
+    if any(value is None for value in values):
+        return {"mean": None, "spread": None, "values": values}
+    return {"mean": fmean(values), "spread": pstdev(values), "values": values}
+
+
+def _cell(value: Document | None) -> str:
+    return "–" if value is None else number(value["mean"], value["spread"])
+
+
+def _unit(name: str, scores: Mapping[Key, Sequence[Document]]) -> str | None:
+    return next((one[name]["unit"] for cells in scores.values() for one in cells if name in one), None)

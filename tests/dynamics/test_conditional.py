@@ -1,0 +1,175 @@
+"""Fields of states and conditions, and the ordinary fields that single conditions give."""
+
+import math
+
+import pytest
+import torch
+from torch.testing import assert_close
+
+from geomotion.dynamics.charts import AnchoredChart, ComposedChart, ScalingChart
+from geomotion.dynamics.conditional import ConditionalLineIntegral, Standing, given
+from geomotion.dynamics.fields import ChartedField
+from geomotion.dynamics.line_integral import LineIntegralField
+from geomotion.dynamics.linear import LinearField
+from geomotion.dynamics.potential import PotentialField
+from geomotion.dynamics.quadrature import GaussLegendre
+from geomotion.dynamics.regularisers import StateDependentRegulariser
+from geomotion.dynamics.time_law import SplineTimeLaw
+from geomotion.networks.coupling import CouplingFlow
+from geomotion.networks.mlp import MLP, JacobianRoot, SkewMatrix
+from geomotion.scores.jacobians import eigenvalues_in_metric, field_jacobian
+
+CONTEXT, TIME_UNIT_S, RATE = 2, 2.0, 0.4
+
+
+def disturbed(module: torch.nn.Module) -> torch.nn.Module:
+    generator = torch.Generator().manual_seed(3)
+    with torch.no_grad():
+        for parameter in module.parameters():
+            parameter.add_(0.2 * torch.randn(parameter.shape, generator=generator).to(parameter))
+    return module.double().eval()
+
+
+def exact(kind: str) -> ChartedField:
+    """In a flow whose origin is the goal of every condition."""
+    torch.manual_seed(0)
+    inner = LinearField(2, RATE, 1.0) if kind == "linear" else PotentialField(2, 8, RATE, 1.0)
+    scaling = ScalingChart(torch.zeros(2 + CONTEXT), 0.1)
+    chart = ComposedChart(scaling, CouplingFlow(2, 4, 16, [0.5, 1.0], 1.5, CONTEXT))
+    anchored = AnchoredChart(chart, torch.zeros(2 + CONTEXT))
+    return disturbed(ChartedField(anchored, Standing(inner, CONTEXT), TIME_UNIT_S))
+
+
+@pytest.fixture(params=["linear", "potential"])
+def field(request) -> ChartedField:
+    return exact(request.param)
+
+
+@pytest.fixture
+def line_integral() -> ConditionalLineIntegral:
+    torch.manual_seed(0)
+    inner = LineIntegralField(
+        JacobianRoot(2, [8], context=CONTEXT),
+        StateDependentRegulariser(MLP(2 + CONTEXT, 2, [6]), 1e-3, 10.0),
+        torch.tensor([0.1, -0.2]),
+        torch.nn.Parameter(torch.tensor([0.3, 0.1])),
+        GaussLegendre(8),
+        SkewMatrix(2, [8], context=CONTEXT),
+    )
+    return ConditionalLineIntegral(inner, CONTEXT).double()
+
+
+def conditions(count: int) -> torch.Tensor:
+    """As lengths, as they stand beside states [m]."""
+    return 0.1 * torch.randn(count, CONTEXT, generator=torch.Generator().manual_seed(5), dtype=torch.float64)
+
+
+def states(count: int) -> torch.Tensor:
+    return 0.1 * torch.randn(count, 2, generator=torch.Generator().manual_seed(6), dtype=torch.float64)
+
+
+def shift_of(condition: torch.Tensor) -> torch.Tensor:
+    """Any map from conditions to goals [m]."""
+    return torch.stack([condition[0] - condition[1], condition.square().sum()])
+
+
+def test_a_fixed_condition_gives_what_the_joint_field_gives_beside_it(field):
+    x = states(12)
+    for condition in conditions(3):
+        shift, plain = shift_of(condition), given(field, condition, shift_of(condition))
+        joint = field(torch.cat([x - shift, condition.expand(12, -1)], -1))
+        assert_close(plain(x), joint[:, :2])
+        assert_close(joint[:, 2:], torch.zeros(12, CONTEXT, dtype=torch.float64), rtol=0, atol=0)
+        assert_close(plain.chart.to_ambient(plain.chart.to_latent(x)), x)
+
+
+def test_trajectories_in_closed_form_keep_the_condition():
+    field, x, times = exact("linear"), states(4), torch.linspace(0, 3, 7, dtype=torch.float64)
+    (condition,) = conditions(1)
+    plain = given(field, condition, shift_of(condition))
+    joint = field.solve(torch.cat([x - shift_of(condition), condition.expand(4, -1)], -1), times)
+    assert_close(plain.solve(x, times), joint[..., :2] + shift_of(condition))
+    assert_close(joint[..., 2:], condition.expand(4, 7, -1))
+
+
+def test_the_condition_moves_the_equilibrium(field):
+    for condition in conditions(5):
+        goal = shift_of(condition)
+        plain = given(field, condition, goal)
+        assert_close(plain(goal), torch.zeros(2, dtype=torch.float64), rtol=0, atol=1e-12)
+        assert_close(plain.chart.to_latent(goal), torch.zeros(2, dtype=torch.float64), rtol=0, atol=1e-12)
+
+
+def test_every_condition_contracts_in_its_metric_at_the_same_proven_rate(field):
+    x = states(40)
+    for condition in conditions(6):
+        plain = given(field, condition, shift_of(condition))
+        largest = eigenvalues_in_metric(plain, plain.chart, x)[:, -1].max()
+        assert float(largest) <= -plain.field.rate / TIME_UNIT_S + 1e-6
+        assert plain.field.rate >= RATE
+
+
+def test_after_a_change_the_distance_to_the_new_goal_falls_at_the_proven_rate():
+    """‖ψ_c'(x_t)‖ ≤ e^{-τ(t-s)} ‖ψ_c'(x_s)‖, wherever the change finds the robot."""
+    field, times = exact("linear"), torch.linspace(0, 4, 30, dtype=torch.float64)
+    first, second = (given(field, condition, shift_of(condition)) for condition in conditions(2))
+    at_change = first.solve(states(50), times[:10])[:, -1]
+    after = second.chart.to_latent(second.solve(at_change, times)).norm(dim=-1)
+    decay = torch.exp(-second.field.rate / TIME_UNIT_S * times)
+    assert bool((after <= decay * after[:, :1] * (1 + 1e-9)).all())
+
+
+def test_two_robots_under_the_same_changes_approach_up_to_the_jumps_of_the_metric():
+    """κ e^{-τt} with κ the product of what each change of chart stretches distances by."""
+    field, stretch = exact("linear"), 1.0
+    plain = [given(field, condition, shift_of(condition)) for condition in conditions(4)]
+    pair, duration = states(2), 0.7
+    begun = latent_distance(plain[0], pair)
+    for now, later in zip(plain, [*plain[1:], plain[-1]], strict=True):
+        pair = now.solve(pair, torch.tensor([duration], dtype=torch.float64))[:, 0]
+        stretch *= latent_distance(later, pair) / latent_distance(now, pair)
+    rate = plain[0].field.rate / TIME_UNIT_S
+    assert latent_distance(plain[-1], pair) <= stretch * math.exp(-rate * len(plain) * duration) * begun * (1 + 1e-9)
+
+
+def latent_distance(field: ChartedField, pair: torch.Tensor) -> float:
+    first, second = field.chart.to_latent(pair)
+    return float((first - second).norm().detach())
+
+
+def test_the_thesis_field_sees_the_condition_in_all_its_networks(line_integral):
+    x, several = states(6), conditions(6)
+    joint = line_integral(torch.cat([x, several], -1))
+    for number, condition in enumerate(several):
+        plain = line_integral.given(condition)
+        assert_close(plain(x[number]), joint[number, :2])
+        root = plain.jacobian_root(x[number])
+        assert_close(root, line_integral.field.jacobian_root(torch.cat([x[number], condition])))
+        largest = torch.linalg.eigvalsh((plain.contraction_jacobian(x) + plain.contraction_jacobian(x).mT) / 2).max()
+        assert largest < 0
+    first, second = (line_integral.given(condition) for condition in several[:2])
+    assert float((first(x) - second(x)).detach().norm()) > 1e-3
+    assert float((first.regulariser(x) - second.regulariser(x)).detach().norm()) > 1e-6
+    assert_close(first(first.base_point), first.base_velocity)
+
+
+def test_a_batch_of_conditions_is_judged_row_by_row(line_integral):
+    x, several = states(4), conditions(4)
+    rows = line_integral.given(several)
+    jacobians = field_jacobian(rows, x)
+    for number, condition in enumerate(several):
+        (alone,) = field_jacobian(line_integral.given(condition), x[number : number + 1])
+        assert_close(jacobians[number], alone)
+
+
+def test_a_motion_that_is_continued_goes_on_where_it_was():
+    """Half of the way and the rest of it are the whole, also where the time law is not that of a clock."""
+    field, (condition,) = exact("linear"), conditions(1)
+    law = disturbed(SplineTimeLaw(knots=6, min_speed=0.2))
+    plain = given(field, condition, shift_of(condition))
+    plain = ChartedField(plain.chart, plain.field, plain.time_unit_s, law)
+    half, whole = torch.tensor([0.9], dtype=torch.float64), torch.tensor([0.9, 2.3], dtype=torch.float64)
+    middle = plain.solve(states(3), half)[:, 0]
+    assert_close(plain.later(0.9).solve(middle, whole[1:] - half)[:, 0], plain.solve(states(3), whole)[:, 1])
+    elapsed = torch.tensor([[0.4]], dtype=torch.float64)
+    assert_close(plain.later(0.9).velocity(middle, elapsed), plain.velocity(middle, elapsed + 0.9))

@@ -1,0 +1,66 @@
+import pytest
+
+from geomotion.config import ReferenceConfig, ReferenceRow, StudyColumn, StudyConfig, StudyVariant
+from geomotion.errors import InvalidSetting
+from geomotion.stages.study_cells import compose_cells
+from geomotion.stages.study_table import aligned_table, lines, markdown_table, table_document
+
+
+def study(**changes) -> StudyConfig:
+    settings = {
+        "title": "Table",
+        "variants": [StudyVariant("plain", ["field=mlp"]), StudyVariant("ours")],
+        "datasets": ["letters/j"],
+        "columns": [StudyColumn("train.dtw", "DTW"), StudyColumn("contraction.jhat.rate", "rate of Ĵ")],
+        "reference": ReferenceConfig("others", ["rate"], [ReferenceRow("plain", "letters/j", [-0.5])]),
+        "notes": ["A note."],
+    }
+    return StudyConfig(**{**settings, **changes})
+
+
+def scores(dtw: float | None, **others: float) -> dict:
+    values = {"train.dtw": dtw, **{name.replace("__", "."): value for name, value in others.items()}}
+    return {name: {"value": value, "unit": "mm", "spread": 9.0} for name, value in values.items()}
+
+
+def test_a_row_for_each_variant_with_the_numbers_of_others_beside_it():
+    found = {("letters/j", "plain"): [scores(1.5, contraction__jhat__rate=-2.0)], ("letters/j", "ours"): [scores(0.5)]}
+    document = table_document(study(), found, [])
+    assert list(lines(document)) == [
+        ["dataset", "variant", "DTW", "rate of Ĵ", "others: rate"],
+        ["letters/j", "plain", "1.5", "-2", "-0.5"],
+        ["", "ours", "0.5", "–", "–"],
+    ]
+    assert "| letters/j | plain | 1.5 | -2 | -0.5 |" in markdown_table(document)
+    assert "DTW: train.dtw [mm]" in aligned_table(document)
+    assert "A note." in aligned_table(document)
+
+
+def test_several_seeds_are_averaged_and_their_spread_is_shown():
+    found = {("letters/j", "plain"): [scores(1.0), scores(3.0)], ("letters/j", "ours"): [scores(1.0), scores(None)]}
+    _, plain, ours = lines(table_document(study(seeds=[0, 1], reference=None), found, []))
+    assert plain[2:] == ["2 ± 1", "–"]
+    assert ours[2:] == ["not finite", "–"]
+
+
+def test_references_are_left_out_where_none_applies():
+    found = {("letters/c", "plain"): [scores(1.0)]}
+    head, *_ = lines(table_document(study(datasets=["letters/c"]), found, []))
+    assert head == ["dataset", "variant", "DTW", "rate of Ĵ"]
+
+
+def test_failures_are_listed():
+    table = table_document(study(), {}, ["plain, letters/j, seed 0: the reason"])
+    assert "failed: plain, letters/j, seed 0: the reason" in aligned_table(table)
+
+
+@pytest.mark.parametrize("changes", [{"datasets": []}, {"seeds": [1, 1]}, {"jobs": 0}, {"variants": []}])
+def test_a_study_needs_one_or_more_of_everything_once(changes):
+    with pytest.raises(InvalidSetting, match=r"study\."):
+        study(**changes)
+
+
+@pytest.mark.parametrize("typed", ["dataset=letters/c", "seed=3", "field=linear"])
+def test_what_a_study_varies_cannot_be_set_beside_it(typed):
+    with pytest.raises(InvalidSetting, match=typed.split("=")[0]):
+        compose_cells("ncds", study(), [typed])

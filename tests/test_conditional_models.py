@@ -1,0 +1,127 @@
+"""Conditional models: their file, what single conditions give, and what is exported."""
+
+import numpy as np
+import pytest
+import torch
+from torch.testing import assert_close
+
+from geomotion import conditional_models, models
+from geomotion import config as schema
+from geomotion.conditional_models import ConditionalPolicy, ConditionalSkill
+from geomotion.dynamics.certificate import Claim, certify
+from geomotion.dynamics.conditional_certificate import for_all_conditions
+from geomotion.errors import CorruptArtefact, InvalidSetting
+from geomotion.export import OnnxPolicy, export_onnx
+from geomotion.models import ModelConfig, Skill
+from geomotion.training.conditioning import Conditioning
+from geomotion.training.data import Geometry
+
+TARGETS = {"left": (0.0, 0.1), "right": (0.05, -0.1), "far": (0.2, 0.0)}
+CONFIGURATIONS = {
+    "linear": ModelConfig(schema.FlowChart(layers=2, features=8), schema.LinearField(), schema.NoRegulariser(), 1),
+    "potential": ModelConfig(
+        schema.FlowChart(layers=2, features=8), schema.PotentialField(units=6), schema.NoRegulariser(), 1
+    ),
+    "line integral": ModelConfig(
+        schema.IdentityChart(),
+        schema.LineIntegralField(hidden_units=[12], skew=True),
+        schema.StateDependentRegulariser(hidden_units=[6]),
+        1,
+    ),
+}
+
+
+def skill_of(config: ModelConfig) -> ConditionalSkill:
+    """Motions to targets, with parameters that are not the initial ones."""
+    places = np.array(list(TARGETS.values()))
+    follows_goal = not isinstance(config.field, schema.LineIntegralField)
+    conditioning = Conditioning.fit(("x", "y"), TARGETS, places, places, follows_goal)
+    goal = (*conditioning.goal, 0.0, 0.0)
+    geometry = Geometry(goal, 0.1, goal, goal, 2.5, context=2)
+    field = models.build(config, geometry).eval()
+    generator = torch.Generator().manual_seed(0)
+    with torch.no_grad():
+        for parameter in field.parameters():
+            parameter.add_(0.1 * torch.randn(parameter.shape, generator=generator))
+    return ConditionalSkill(Skill(field, config, geometry, ("position_m",), (0, 1, 2), ()), conditioning)
+
+
+@pytest.fixture(params=list(CONFIGURATIONS))
+def skill(request) -> ConditionalSkill:
+    return skill_of(CONFIGURATIONS[request.param])
+
+
+def states(count: int) -> torch.Tensor:
+    return 0.1 * torch.randn(count, 2, generator=torch.Generator().manual_seed(1))
+
+
+def test_it_comes_back_from_its_file(skill, tmp_path):
+    conditional_models.save(tmp_path / "model.pt", skill)
+    loaded = conditional_models.load(tmp_path / "model.pt")
+    assert isinstance(loaded, ConditionalSkill)
+    assert loaded.conditioning == skill.conditioning
+    for condition in (TARGETS["far"], [0.3, -0.2]):
+        assert_close(loaded.given(condition).field(states(5)), skill.given(condition).field(states(5)), rtol=0, atol=0)
+
+
+def test_who_expects_no_conditions_is_told(skill, tmp_path):
+    conditional_models.save(tmp_path / "model.pt", skill)
+    with pytest.raises(InvalidSetting, match=r"numbers for x, y: .* conditional"):
+        models.load(tmp_path / "model.pt")
+    document = torch.load(tmp_path / "model.pt", weights_only=True)
+    del document["conditioning"]["mean"]
+    torch.save(document, tmp_path / "model.pt")
+    with pytest.raises(CorruptArtefact, match="conditions"):
+        conditional_models.load(tmp_path / "model.pt")
+
+
+def test_a_policy_gives_each_row_the_velocity_of_its_condition(skill):
+    several = torch.tensor([*TARGETS.values(), (0.3, 0.3)])
+    velocities = ConditionalPolicy(skill)(states(4), several)
+    for number, condition in enumerate(several.tolist()):
+        assert_close(velocities[number], skill.given(condition).field(states(4)[number]), rtol=1e-4, atol=1e-6)
+
+
+def test_given_skills_are_independent(skill):
+    first = skill.given(TARGETS["left"])
+    before = skill.given(TARGETS["far"]).field(states(3))
+    first.field.double()
+    assert_close(skill.given(TARGETS["far"]).field(states(3)), before, rtol=0, atol=0)
+
+
+def test_targets_are_equilibria_of_fields_that_contract_by_construction():
+    for name in ("linear", "potential"):
+        skill = skill_of(CONFIGURATIONS[name])
+        for target in (*TARGETS.values(), (-0.3, 0.4)):
+            plain = skill.given(target)
+            assert_close(plain.goal, torch.tensor(target))
+            assert_close(plain.field(plain.goal), torch.zeros(2), rtol=0, atol=1e-5)
+
+
+def test_one_certificate_speaks_for_all_conditions():
+    skill = skill_of(CONFIGURATIONS["linear"])
+    each = [certify(skill.given(condition).field, states(20)) for condition in TARGETS.values()]
+    whole = for_all_conditions(each)
+    assert whole.claim is Claim.by_construction
+    assert whole.rate_per_s == pytest.approx(each[0].rate_per_s)
+    assert whole.overshoot.worst == max(one.overshoot.worst for one in each)
+    assert "every condition" in whole.reason
+
+
+def test_baselines_know_no_conditions():
+    config = ModelConfig(schema.IdentityChart(), schema.VelocityNetworkField(), schema.NoRegulariser(), 0)
+    with pytest.raises(InvalidSetting, match="a field that knows them"):
+        skill_of(config)
+
+
+@pytest.mark.usefixtures("without_shape_checks")
+@pytest.mark.parametrize("name", ["linear", "line integral"])
+def test_an_exported_policy_takes_states_and_conditions(name, tmp_path):
+    field = ConditionalPolicy(skill_of(CONFIGURATIONS[name]))
+    export_onnx(field, tmp_path / "policy.onnx")
+    policy = OnnxPolicy(tmp_path / "policy.onnx")
+    for count in (1, 5):
+        several = 0.2 * torch.randn(count, 2)
+        with torch.no_grad():
+            expected = field(states(count), several).numpy()
+        np.testing.assert_allclose(policy(states(count).numpy(), several.numpy()), expected, rtol=2e-4, atol=1e-5)
