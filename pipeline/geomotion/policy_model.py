@@ -15,7 +15,7 @@ class Policy(PythonModel):
         """Open the ONNX file."""
         self.session = onnxruntime.InferenceSession(context.artifacts["policy"], providers=["CPUExecutionProvider"])
 
-    def predict(self, context, model_input, params=None):  # type: ignore[no-untyped-def]
+    def predict(self, context, model_input: np.ndarray, params=None):  # type: ignore[no-untyped-def]
         """Velocities at states, or at ``{"state_m": …, "condition": …, "elapsed_s": …}``, whatever the field takes."""
         inputs = model_input if isinstance(model_input, Mapping) else {"state_m": model_input}
         return self.session.run(None, {name: np.asarray(values, dtype=np.float32) for name, values in inputs.items()})[

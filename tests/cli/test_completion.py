@@ -44,7 +44,7 @@ def test_choices_of_a_group_with_sub_folders_and_earlier_values_of_a_sweep(offer
     assert offered("ncds train dataset=lasa/spo") == ["dataset=lasa/spoon"]
     assert offered("ncds train field=linea") == ["field=linear"]
     assert "dataset=lasa/angle,letters/c" in offered("ncds train -m dataset=lasa/angle,let")
-    assert offered("ncds train experiment=th") == ["experiment=thesis/ncds"]
+    assert offered("ncds train experiment=thesis/n") == ["experiment=thesis/ncds"]
 
 
 def test_values_are_shown_as_they_are_written(offered):

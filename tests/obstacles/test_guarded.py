@@ -13,7 +13,7 @@ from geomotion.obstacles.solids import Sphere
 
 from .obstacle_sets import obstacle_sets
 
-STARTS = 40
+STARTS = 30
 ROUNDING = 1e-12
 SETS = obstacle_sets()
 
@@ -21,10 +21,10 @@ SETS = obstacle_sets()
 class Turning(nn.Module):
     """ẋ = A x with A = -I and a turn between the first two axes."""
 
-    def __init__(self, dim: int, turn: float) -> None:
+    def __init__(self, dim: int, turn: float, dtype: torch.dtype = torch.float64) -> None:
         super().__init__()
         self.dim = dim
-        self.matrix = -torch.eye(dim).double()
+        self.matrix = -torch.eye(dim, dtype=dtype)
         self.matrix[0, 1], self.matrix[1, 0] = turn, -turn
 
     def forward(self, x):
@@ -34,7 +34,7 @@ class Turning(nn.Module):
 def test_far_from_obstacles_trajectories_are_those_of_the_field_at_all_wanted_times():
     field = ModulatedField(Turning(2, 2.0), [Sphere(torch.tensor([1e4, 0.0]).double(), 1e-3)])
     start = torch.tensor([[1.0, 0.5]]).double()
-    for wanted, tolerance, expected in ((601, 1e-4, 1e-7), (601, 1e-10, 1e-9), (7, 1e-10, 1e-9)):
+    for wanted, tolerance, expected in ((601, 1e-4, 1e-6), (601, 1e-10, 1e-9), (7, 1e-10, 1e-9)):
         times = torch.linspace(0, 3, wanted).double()
         found = GuardedSolver(field, 0.0, tolerance).solve(start, times)[0]
         exact = torch.linalg.matrix_exp(field.field.matrix * times[:, None, None]) @ start[0]
@@ -49,7 +49,7 @@ def test_random_starts_stay_outside_and_reach_the_goal(name):
     starts = 3 * torch.rand(4 * STARTS, dim, generator=generator).double() - torch.tensor([0.5, 1.5, 1.5][:dim])
     starts = starts[torch.stack([obstacle.level(starts) > 1 for obstacle in obstacles]).all(dim=0)][:STARTS]
     starts[0] = torch.tensor([2.0, 0.0, 0.0][:dim])  # heads for the middle
-    times = torch.linspace(0, 10, 21).double()
+    times = torch.linspace(0, 8, 17).double()
     field = ModulatedField(Turning(dim, 0.3), obstacles)
     found = rollout_among_obstacles(field, starts, times, goal=torch.zeros(dim).double(), goal_tolerance=0.05)
     assert not found.note
@@ -63,15 +63,14 @@ def test_a_step_too_long_for_fixed_steps_is_kept_outside():
     field = ModulatedField(Turning(2, 0.0), [sphere])
     times, start = torch.tensor([0.0, 1.0, 2.0]).double(), torch.tensor([[1.6, 0.0]]).double()
     found = rollout_among_obstacles(field, start, times)
-    fine = rollout_among_obstacles(field, start, times, method="rk4", substeps=4000)
+    fine = rollout_among_obstacles(field, start, times, method="rk4", substeps=500)
     assert sphere.level(found.states).min() > 1 - ROUNDING
     assert_close(found.states, fine.states, atol=1e-3, rtol=0)
 
 
 def test_single_precision_stays_outside_up_to_its_rounding():
     sphere = Sphere(torch.tensor([1.0, 0.0]), 0.3)
-    field = ModulatedField(Turning(2, 0.0), [sphere])
-    field.field.matrix = field.field.matrix.float()
+    field = ModulatedField(Turning(2, 0.0, torch.float32), [sphere])
     starts = torch.tensor([[1.6, 0.0], [2.0, 0.01], [1.3, 0.2]])
     found = rollout_among_obstacles(field, starts, torch.linspace(0, 8, 41))
     assert sphere.level(found.states).min() > 1 - 1e-5

@@ -68,7 +68,8 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
     if conditioning is not None:
         data, geometry = with_conditions(data, _conditions(selected), conditioning)
     field = models.build(config.model, geometry)
-    history = fit(field, _objective(config, data, geometry), _schedule(config), run.checkpoint, run.log_series)
+    objective = _objective(config, data, geometry)
+    history = fit(field, objective, _schedule(config, geometry), run.checkpoint, run.log_series)
 
     skill = Skill(field, config.model, geometry, channels, train_demos, test_demos)
     if conditioning is None:
@@ -129,11 +130,13 @@ def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Ob
             raise TypeError(f"no objective for {type(unknown).__name__}")
 
 
-def _schedule(config: TrainConfig) -> Schedule:
+def _schedule(config: TrainConfig, geometry: Geometry) -> Schedule:
+    """The weights under a condition are a sum, which moves farther in a step than each of its terms."""
     training = config.training
+    slower = (1 + geometry.context) ** 0.5
     return Schedule(
         training.steps,
-        training.learning_rate,
+        training.learning_rate / slower,
         training.ramp_steps,
         training.gradient_clip,
         training.checkpoint_every_steps,
