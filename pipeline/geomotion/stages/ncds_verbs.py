@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from geomotion.config import DatasetConfig, NcdsConfig
+from geomotion.config import DatasetConfig, NcdsConfig, NoObstacle
 from geomotion.figures.report.conditions import condition_rows
 from geomotion.figures.studies.fields import FIELD_STUDY_FIGURES
 from geomotion.files import read_json
@@ -86,9 +86,11 @@ def _evaluate(session: Session) -> VerbResult:
 
 
 def _run(session: Session) -> VerbResult:
-    _, evaluated, reported = session.produce("rollout"), _evaluate(session), shared.report_verb(session)
+    rolled, evaluated, reported = _rollout(session), _evaluate(session), shared.report_verb(session)
     document = evaluated.document | reported.document
-    return VerbResult(f"{evaluated.text}\n{reported.text}", document, objective=evaluated.objective)
+    among_obstacles = not isinstance(session.config.obstacle, NoObstacle)
+    text = f"{rolled.text}\n\n{evaluated.text}" if among_obstacles else evaluated.text
+    return VerbResult(f"{text}\n{reported.text}", document, objective=evaluated.objective)
 
 
 def _certificate_line(certificate: dict[str, Any]) -> str:
