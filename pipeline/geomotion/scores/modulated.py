@@ -15,7 +15,7 @@ from geomotion.obstacles.obstacle import Obstacle, clearance
 from geomotion.scores.contraction import contraction_scores
 from geomotion.scores.evaluation import Evaluation, Roll
 from geomotion.scores.jacobians import eigenvalues_in_metric, field_jacobian, symmetric_eigenvalues
-from geomotion.scores.nearby import ToClaimed, distance_scores, pairwise_distances
+from geomotion.scores.nearby import ToClaimed, distance_scores, nearby_distances
 from geomotion.scores.score import Score, share_score
 from geomotion.types import Bool, Float, States, Tensor, Times, Trajectories
 
@@ -63,12 +63,11 @@ def judge_modulated_nearby(
     """
     if len(starts) < 2:
         return Evaluation(omitted={"obstacles.nearby": "distances need two starts outside of the obstacles"})
-    trajectories = roll(starts, times_s)
-    latent = to_claimed(trajectories.reshape(-1, starts.shape[1])).reshape(trajectories.shape)
+    euclidean, claimed = nearby_distances(roll, to_claimed, starts, times_s)
     note = f"{len(starts)} rollouts among obstacles, {len(times_s)} times over {times_s[-1]:.3g} s"
     return Evaluation(
-        distance_scores(pairwise_distances(trajectories), "obstacles.nearby.euclidean", note)
-        | distance_scores(pairwise_distances(latent), "obstacles.nearby.claimed", note)
+        distance_scores(euclidean, "obstacles.nearby.euclidean", note)
+        | distance_scores(claimed, "obstacles.nearby.claimed", note)
     )
 
 

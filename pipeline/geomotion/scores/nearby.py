@@ -46,9 +46,7 @@ def judge_nearby(
     """
     if len(starts) < 2:
         return Evaluation(omitted={"nearby": "distances need two rollouts; set evaluation.nearby_starts above 1"})
-    trajectories = roll(starts, times_s)
-    latent = to_claimed(trajectories.reshape(-1, starts.shape[1])).reshape(trajectories.shape)
-    euclidean, claimed = pairwise_distances(trajectories), pairwise_distances(latent)
+    euclidean, claimed = nearby_distances(roll, to_claimed, starts, times_s)
     note = f"{len(starts)} rollouts, {len(euclidean)} pairs, {len(times_s)} times over {times_s[-1]:.3g} s"
     scores = distance_scores(euclidean, "nearby.euclidean", note) | distance_scores(claimed, "nearby.claimed", note)
     arrays = {
@@ -76,6 +74,15 @@ def distance_scores(distances: Distances, prefix: str, note: str) -> dict[str, S
             float(mean[-1] / mean[0]), "1", len(distances), statistic="final / initial mean", note=note
         ),
     }
+
+
+def nearby_distances(
+    roll: Roll, to_claimed: ToClaimed, starts: Float[np.ndarray, "start D"], times_s: Float[np.ndarray, " time"]
+) -> tuple[Distances, Distances]:
+    """Distances between all rollouts at all times, Euclidean ones [m] and those of the claimed metric."""
+    trajectories = roll(starts, times_s)
+    latent = to_claimed(trajectories.reshape(-1, starts.shape[1])).reshape(trajectories.shape)
+    return pairwise_distances(trajectories), pairwise_distances(latent)
 
 
 def bound_excess(distances: Distances, times_s: Float[np.ndarray, " time"], rate: float, note: str) -> Score:

@@ -162,9 +162,8 @@ def _follow(phase: Phase, state: Float[Tensor, "1 D"], times: Times, solver: Sol
 
 @torch.no_grad()
 def _velocities(phase: Phase, states: Float[Tensor, "time D"], times: Times) -> Float[Tensor, "time D"]:
-    if phase.field is None:
-        return phase.skill.field.velocity(states, (times - phase.begins_s)[:, None])
-    return phase.field.velocity(states, (times - phase.begins_s)[:, None])
+    field = phase.skill.field if phase.field is None else phase.field
+    return field.velocity(states, (times - phase.begins_s)[:, None])
 
 
 @torch.no_grad()
