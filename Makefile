@@ -12,7 +12,7 @@ endif
 export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint format type check bench certify regress ui clean
+.PHONY: help install demo test lint format type check bench certify obstacles regress ui clean
 
 help:  ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
@@ -46,12 +46,17 @@ type: $(STAMP)  ## types of the library and the command line
 
 check: lint type test  ## everything that a change has to pass
 
+SEARCHES := benchmarks/certificates.py benchmarks/obstacles.py  # have targets of their own
+
 bench: $(STAMP)  ## time velocity queries, integration, training, kinematics, graphs and replanning
-	@for script in $(filter-out benchmarks/certificates.py,$(wildcard benchmarks/[a-z]*.py)); do \
+	@for script in $(filter-out $(SEARCHES),$(wildcard benchmarks/[a-z]*.py)); do \
 		$(BIN)/python $$script || exit 1; done
 
 certify: $(STAMP)  ## search for violations of what is claimed by construction, at full size (an hour of CPU time)
 	$(BIN)/python benchmarks/certificates.py
+
+obstacles: $(STAMP)  ## send 1000 random starts past each of ten sets of obstacles: none may enter (minutes)
+	$(BIN)/python benchmarks/obstacles.py
 
 regress: $(STAMP)  ## small pinned experiments against their stored scores
 	@for name in $(notdir $(basename $(wildcard conf/experiment/regression/*.yaml))); do \

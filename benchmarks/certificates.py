@@ -30,6 +30,7 @@ from torch import Tensor
 
 from geomotion import config as schema
 from geomotion import models
+from geomotion.dynamics.certificate import slowest_rate
 from geomotion.dynamics.fields import ChartedField
 from geomotion.dynamics.rollout import rollout
 from geomotion.models import ModelConfig
@@ -38,7 +39,11 @@ from geomotion.training.data import Geometry
 
 DIMENSIONS = (2, 3, 8)
 DRAWS, STATES, AT_ONCE = 20, 100_000, 5_000
-FIELDS: dict[str, schema.FieldConfig] = {"linear": schema.LinearField(), "potential": schema.PotentialField()}
+FIELDS: dict[str, schema.FieldConfig] = {
+    "linear": schema.LinearField(),
+    "embedded": schema.LinearField(skill_dim=1),  # all other coordinates decay
+    "potential": schema.PotentialField(),
+}
 CHARTS: dict[str, schema.ChartConfig] = {
     "identity": schema.IdentityChart(),
     "flow": schema.FlowChart(layers=4, features=16),
@@ -161,7 +166,7 @@ class Paced:
 
 def proven_rate(model: ChartedField) -> float:
     """τ of the certificate [1/s]."""
-    return model.field.rate / model.time_unit_s
+    return slowest_rate(model) / model.time_unit_s
 
 
 def examine(states: int, task: tuple[str, str, int, int]) -> tuple[tuple[str, str, int], Finding, Finding]:

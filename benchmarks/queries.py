@@ -15,12 +15,14 @@ from line_integral import measure
 
 from geomotion import config as schema
 from geomotion import models
-from geomotion.dynamics.fields import ChartedField
-from geomotion.export import OnnxPolicy, export_onnx
-from geomotion.models import ModelConfig
+from geomotion.export import Arrays, OnnxPolicy, export_onnx
+from geomotion.models import ModelConfig, Skill
+from geomotion.policy.policy import Policy
+from geomotion.policy.training_range import TrainingRange
 from geomotion.training.data import Geometry
+from geomotion.types import Tensor
 
-DIMENSIONS = (2, 8)
+DIMENSIONS = (2, 8, 44)
 BATCHES = {1: 1000, 1000: 20}  # states at once, and timed calls
 THESIS = ModelConfig(schema.IdentityChart(), schema.LineIntegralField(), schema.ConstantRegulariser(), 0)
 
@@ -34,18 +36,20 @@ MODELS = {
 ADAPTIVE = {"line integral, dopri5"}  # how often they evaluate the network depends on the state: not exported
 
 
-def build(config: ModelConfig, dim: int) -> ChartedField:
-    """A field in `dim` dimensions, about as large and long as a handwritten letter."""
+def build(config: ModelConfig, dim: int) -> Skill:
+    """A skill in `dim` dimensions, about as large and long as a handwritten letter."""
     centre = (0.0,) * dim
-    field = models.build(config, Geometry(centre, 0.05, centre, centre, 3.0)).eval()
+    geometry = Geometry(centre, 0.05, centre, centre, 3.0)
+    field = models.build(config, geometry).eval()
     with torch.no_grad():
         for parameter in field.parameters():
             parameter.add_(0.05 * torch.randn(parameter.shape, generator=torch.Generator().manual_seed(0)))
-    return field.requires_grad_(False)
+    return Skill(field.requires_grad_(False), config, geometry, ("position_m",), (0,), ())
 
 
-def row(name: str, field: ChartedField) -> str:
+def row(name: str, skill: Skill) -> str:
     """Times of one field, and whether both ways give the same velocity."""
+    field = skill.field
     generator = torch.Generator().manual_seed(0)
     states = {count: 0.02 * torch.randn(count, field.dim, generator=generator) for count in BATCHES}
     cells = [_cell(lambda one=one: field(one), BATCHES[count]) for count, one in states.items()]
@@ -53,10 +57,10 @@ def row(name: str, field: ChartedField) -> str:
     if name in ADAPTIVE:
         cells += ["-"] * len(BATCHES)
     else:
-        policy = _exported(field)
-        arrays = {count: one.numpy() for count, one in states.items()}
+        policy = _exported(skill, states[1000])
+        arrays = {count: {"state_m": one.numpy()} for count, one in states.items()}
         cells += [_cell(lambda one=one: policy(one), BATCHES[count]) for count, one in arrays.items()]
-        difference = f"{np.abs(policy(arrays[1000]) - field(states[1000]).numpy()).max():.1e} m/s"
+        difference = f"{_difference(policy(arrays[1000]), field(states[1000])):.1e} m/s"
     return f"{name:<27}{field.dim:>2}" + "".join(f"{cell:>19}" for cell in cells) + f"{difference:>14}"
 
 
@@ -65,9 +69,13 @@ def _cell(call: Callable[[], object], calls: int) -> str:
     return f"{median:.3f} ({spread:.3f})"
 
 
-def _exported(field: ChartedField) -> OnnxPolicy:
+def _difference(found: Arrays, expected: Tensor) -> float:
+    return float(np.abs(found["velocity_m_per_s"] - expected.numpy()).max())
+
+
+def _exported(skill: Skill, states: Tensor) -> OnnxPolicy:
     with tempfile.TemporaryDirectory() as folder:
-        export_onnx(field, Path(folder) / "policy.onnx")
+        export_onnx(Policy(skill, TrainingRange(states, 0.05)), Path(folder) / "policy.onnx")
         return OnnxPolicy(Path(folder) / "policy.onnx")
 
 

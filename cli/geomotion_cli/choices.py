@@ -12,8 +12,10 @@ from hydra.plugins.config_source import ConfigSource
 from geomotion.config import CommandConfig, GmsConfig, NcdsConfig
 
 CONFIG_TYPES: dict[str, type[CommandConfig]] = {"gms": GmsConfig, "ncds": NcdsConfig}
-_GMS_GROUPS = {"dataset", "obstacle", "experiment"}  # its other settings have one form each
+_GMS_GROUPS = {"dataset", "obstacle", "experiment", "space"}  # its other settings have one form each
 _GMS_EXPERIMENT = re.compile(r"thesis/(gms|fig_[34]_.*)|regression/gms_.*")  # chapters 3 and 4 of the thesis
+_OF_GMS = {"experiment": _GMS_EXPERIMENT, "space": re.compile("joint|pose")}  # the other program has the rest
+_OF_BOTH = {"demonstrated"}
 _INTERNAL_SUFFIX = "_schema"  # bases of other options, of no use by themselves
 
 
@@ -26,7 +28,8 @@ def program_options(program: str) -> dict[str, list[str]]:
     """The options of one program, by group."""
     found = group_options(*top_level_names(CONFIG_TYPES[program]))
     is_gms = program == "gms"
-    found["experiment"] = [one for one in found["experiment"] if bool(_GMS_EXPERIMENT.fullmatch(one)) == is_gms]
+    for group, of_gms in _OF_GMS.items():
+        found[group] = [one for one in found[group] if one in _OF_BOTH or bool(of_gms.fullmatch(one)) == is_gms]
     return {group: options for group, options in found.items() if not is_gms or group in _GMS_GROUPS}
 
 

@@ -150,7 +150,7 @@ PROGRAMS = {
         "Neural contractive dynamical systems: vector fields learned from a handful of demonstrations.",
         {
             "run": Verb(
-                "the whole chain: ingest, train, rollout, eval, report",
+                "the whole chain: ingest, train, rollout, eval, report; poses also on the simulated Panda",
                 {
                     **_DATASET,
                     **_MODEL,
@@ -197,6 +197,37 @@ PROGRAMS = {
                     **_JSON,
                 },
                 ("run=latest", "run=latest evaluation=peers output=json"),
+            ),
+            "export": Verb(
+                "write the policy as an ONNX file that runs without this library, with an example in Python",
+                {
+                    **_RUN,
+                    "policy.range_margin=0.5": "how far from the demonstrations its status says `outside`",
+                    "policy.obstacle.reactivity=1.0": "how far a ball in the way, told at run time, is felt",
+                    **_JSON,
+                },
+                ("run=latest", "dataset=robotasks9/pouring space=R3xSO3 field.skill_dim=2"),
+            ),
+            "replay": Verb(
+                "let the policy lead the simulated Panda while it is pushed; makes a film; exit status 3 out of reach",
+                {
+                    **_RUN,
+                    "replay.start=demo:0": "from the first state of a demonstration, or from a state",
+                    "replay.pushes=[{time_s:5,force_n:[0,20,0],duration_s:0.25}]": "forces at the tip [N], or "
+                    "displacement_m; [] for none",
+                    "replay.goal_changes=[{time_s:4,shift_m:[0,0.05,0]}]": "the goal is elsewhere from then on [m]",
+                    "replay.noise_m=0.002 replay.noise_rad=0.01": "of what is measured",
+                    "replay.latency_s=0.05": "how old what is measured is",
+                    "replay.control_hz=60": "how often the policy is asked; divides 240",
+                    "obstacle=sphere obstacle.centre_m=[0.5,0,0.3] obstacle.radius_m=0.05": "in the way of the tip [m]",
+                    **_JSON,
+                },
+                (
+                    "run=latest",
+                    "run=latest replay.pushes=[] replay.latency_s=0.1",
+                    "run=latest obstacle=sphere obstacle.centre_m=[0.5,0,0.3] obstacle.radius_m=0.05 "
+                    "obstacle.velocity_m_per_s=[0,0.05,0]",
+                ),
             ),
             "report": Verb("write one HTML page about a run", {**_RUN, **_STORE}, ("run=latest",)),
             "compare": _COMPARE,

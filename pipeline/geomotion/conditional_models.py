@@ -12,7 +12,7 @@ from torch import nn
 from geomotion import models
 from geomotion.dynamics.conditional import given
 from geomotion.dynamics.fields import ChartedField
-from geomotion.dynamics.time_law import TimeLaw
+from geomotion.dynamics.time_law import ConditionalTimeLaw, TimeLaw
 from geomotion.errors import CorruptArtefact
 from geomotion.models import Skill
 from geomotion.training.conditioning import Conditioning
@@ -40,7 +40,7 @@ class ConditionalSkill:
     @property
     def dim(self) -> int:
         """D, coordinates of a state."""
-        return len(self.conditioning.goal)
+        return len(self.conditioning.goals[0])
 
     def given(self, condition: Sequence[float], key: str = "condition") -> Skill:
         """The skill for one condition, independent of this one.
@@ -55,11 +55,15 @@ class ConditionalSkill:
         values = np.array(self.conditioning.checked(condition, key))
         geometry, dim = self.augmented.geometry, self.dim
         code = torch.tensor(self.conditioning.codes(values) * geometry.scale_m, dtype=torch.float32)
-        shift = self.conditioning.shift_at(values)
-        field = given(deepcopy(self.augmented.field), code, torch.tensor(shift, dtype=torch.float32)).eval()
-        centre, mean = (tuple((place[:dim] + shift).tolist()) for place in (geometry.centre, geometry.mean))
+        frame = self.conditioning.frame_at(values)
+        shift = torch.tensor(frame.shift_m, dtype=torch.float32)
+        field = given(deepcopy(self.augmented.field), code, shift, frame.stretch, frame.slowdown).eval()
+        centre, mean = (
+            tuple((frame.shift_m + frame.stretch * np.array(place[:dim])).tolist())
+            for place in (geometry.centre, geometry.mean)
+        )
         goal = tuple(self.conditioning.goal_at(values).tolist())
-        plain = Geometry(centre, geometry.scale_m, mean, goal, geometry.duration_s)
+        plain = Geometry(centre, frame.stretch * geometry.scale_m, mean, goal, frame.slowdown * geometry.duration_s)
         return replace(self.augmented, field=field, geometry=plain)
 
 
@@ -70,28 +74,27 @@ class ConditionalPolicy(nn.Module):
         skill: The trained field.
     """
 
-    mean: Tensor
+    offset: Tensor
     directions: Tensor
-    goal_slopes: Tensor
+    shifts: Tensor
+    log_units: Tensor
 
     def __init__(self, skill: ConditionalSkill) -> None:
         super().__init__()
-        conditioning, scale_m = skill.conditioning, skill.augmented.geometry.scale_m
+        conditioning = skill.conditioning
         self.field: ChartedField = deepcopy(skill.augmented.field)
         self.dim = skill.dim
         self.condition_dim = len(conditioning.names)
-        slopes = torch.tensor(conditioning.goal_slopes) if conditioning.follows_goal else torch.zeros(1)
-        for name, values in (
-            ("mean", torch.tensor(conditioning.mean)),
-            ("directions", torch.tensor(conditioning.directions)),
-            ("goal_slopes", slopes),
-        ):
-            self.register_buffer(name, values)
-        self.scale_m = scale_m
-        self.follows_goal = conditioning.follows_goal
+        self.scale_m = skill.augmented.geometry.scale_m
+        logs = torch.tensor([conditioning.log_stretches, conditioning.log_slowdowns])
+        goals, moving = torch.tensor(conditioning.goals), float(conditioning.moves_frame)
+        self.register_buffer("offset", torch.tensor(conditioning.offset))
+        self.register_buffer("directions", torch.tensor(conditioning.directions))
+        self.register_buffer("shifts", moving * goals)
+        self.register_buffer("log_units", moving * logs.T)
 
     @property
-    def time_law(self) -> TimeLaw | None:
+    def time_law(self) -> TimeLaw | ConditionalTimeLaw | None:
         """That of the field."""
         return self.field.time_law
 
@@ -99,11 +102,24 @@ class ConditionalPolicy(nn.Module):
         self, x: State, condition: Float[Tensor, "*batch K"], elapsed_s: Float[Tensor, "*batch 1"] | None = None
     ) -> Velocity:
         """ẋ at a time since the start of the motion [s]; without one, at mean speed."""
-        code = (condition - self.mean) @ self.directions
-        if self.follows_goal:
-            x = x - code @ self.goal_slopes.T
-        velocity: Tensor = self.field(torch.cat([x, self.scale_m * code], -1), elapsed_s)
-        return velocity[..., : self.dim]
+        stretch, slowdown = self.units(condition)
+        velocity: Tensor = self.field(self.augmented(x, condition), None if elapsed_s is None else elapsed_s / slowdown)
+        return stretch / slowdown * velocity[..., : self.dim]
+
+    def augmented(self, x: State, condition: Float[Tensor, "*batch K"]) -> Float[Tensor, "*batch augmented"]:
+        """States of the field: in its frame, with the codes of their conditions as lengths behind them."""
+        code, (stretch, _) = self._code(condition), self.units(condition)
+        return torch.cat([(x - code @ self.shifts) / stretch, self.scale_m * code], -1)
+
+    def units(
+        self, condition: Float[Tensor, "*batch K"]
+    ) -> tuple[Float[Tensor, "*batch 1"], Float[Tensor, "*batch 1"]]:
+        """By which lengths and times are larger than in the frame of the field."""
+        stretch, slowdown = (self._code(condition) @ self.log_units).exp().chunk(2, -1)
+        return stretch, slowdown
+
+    def _code(self, condition: Float[Tensor, "*batch K"]) -> Float[Tensor, "*batch R"]:
+        return self.offset + condition @ self.directions
 
 
 def save(path: Path, skill: ConditionalSkill) -> None:

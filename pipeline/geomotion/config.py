@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from dataclasses import field as default
 from enum import Enum
-from typing import Any
+from typing import Any, ClassVar
 
 from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING, OmegaConf
@@ -23,10 +23,16 @@ LASA_SHAPES = (
     "Spoon", "Sshape", "Trapezoid", "Worm", "WShape", "Zshape",
     "Multi_Models_1", "Multi_Models_2", "Multi_Models_3", "Multi_Models_4",
 )  # fmt: skip
+# Sec. 6.4 stacks two and four shapes without naming them
 STACKED_LASA_SHAPES = {
     "stacked_4d": ("Angle", "Sine"),
     "stacked_8d": ("Angle", "Line", "Sine", "Sharpc"),
-}  # Sec. 6.4 stacks two and four shapes without naming them
+    "stacked_44d": (
+        "Angle", "CShape", "DoubleBendedLine", "heee", "JShape", "JShape_2", "Leaf_1", "Leaf_2", "Line", "NShape",
+        "RShape", "Saeghe", "Sharpc", "Sine", "Spoon", "Sshape", "WShape", "Worm", "Zshape",
+        "Multi_Models_1", "Multi_Models_2", "Multi_Models_4",
+    ),  # as many dimensions as the human motion of Table 6.3 has
+}  # fmt: skip
 CONDITIONED_LASA_SHAPES = {
     "two_shapes": ("Angle", "Line"),  # Fig. 5.8
     "seven_shapes": ("Angle", "Line", "Sine", "Sharpc", "CShape", "NShape", "WShape"),
@@ -64,7 +70,10 @@ def _are_finite(values: Any) -> bool:
 
 
 def _require_rates(field: Any) -> None:
-    _require_positive("field", field, "min_rate_per_duration")
+    _require_positive("field", field, "min_rate_per_duration", "transverse_rate_per_duration")
+    _require(field.skill_dim is None or field.skill_dim > 0, "field.skill_dim", field.skill_dim, "1 or more, or null")
+    _require(0 < field.transverse_start <= 1, "field.transverse_start", field.transverse_start, "above 0, at most 1")
+    _require_positive("field", field, "transverse_rise")
     _require(
         field.initial_rate_per_duration > field.min_rate_per_duration,
         "field.initial_rate_per_duration",
@@ -78,6 +87,32 @@ def _require_layer_widths(prefix: str, widths: list[int]) -> None:
 
 
 # ---------------------------------------------------------------- demonstrations
+class PoseSpace(Enum):
+    """Where poses live that a field is learned on, Sec. 6.2."""
+
+    R3xSO3 = "R3xSO3"  # q and -q are one orientation
+    R3xS3 = "R3xS3"  # they are a whole turn apart
+
+
+class Cover(Enum):
+    """How orientations are kept inside the first cover."""
+
+    radial = "radial"  # smooth
+    cube = "cube"  # Eq. (6.4)
+
+
+@dataclass
+class PoseConfig:
+    """Vectors of poses: position, and rotation from the mean orientation, without the edge of its first cover."""
+
+    cover: Cover = Cover.radial
+    lever_m_per_rad: float | None = None  # length that counts as a radian; null: positions and turns extend equally far
+
+    def __post_init__(self) -> None:
+        if self.lever_m_per_rad is not None:
+            _require_positive("pose", self, "lever_m_per_rad")
+
+
 class Condition(Enum):
     """What demonstrations of one set are told apart by, Sec. 5.5."""
 
@@ -187,6 +222,28 @@ class LasaDataset(DatasetConfig):
         _check_condition(self, self.shapes)
         if self.condition is not Condition.none and (self.train_demos, self.test_demos) == ([0, 1, 2, 3, 4], [5, 6]):
             self.train_demos = self.test_demos = None  # the same of every condition
+
+
+@dataclass
+class LasaPoseDataset(DatasetConfig):
+    """Poses made of two LASA shapes: positions in a plane, orientations projected onto the sphere S³, Sec. 6.4.5."""
+
+    position_shape: str = "Angle"  # the thesis takes "two distinct letter shapes" without naming them
+    orientation_shape: str = "Sine"
+    sphere_distance_m: float = (
+        0.05  # from the plane of the orientations to the middle of the sphere: 90 degrees at 50 mm
+    )
+    root: str | None = None  # see LasaDataset
+    train_demos: list[int] | None = default(default_factory=lambda: [0, 1, 2, 3, 4])
+    test_demos: list[int] | None = default(default_factory=lambda: [5, 6])
+    preprocess: PreprocessConfig = default(
+        default_factory=lambda: PreprocessConfig(trim_start_points=15, velocity=VelocitySource.recorded)
+    )
+
+    def __post_init__(self) -> None:
+        for shape in (self.position_shape, self.orientation_shape):
+            _require_known("LASA shape", shape, LASA_SHAPES)
+        _require_positive("dataset", self, "sphere_distance_m")
 
 
 @dataclass
@@ -452,7 +509,7 @@ class FlowChart(ChartConfig):
     """Invertible flow of affine couplings, conditioned on Fourier features."""
 
     layers: int = 10
-    features: int = 64  # of each layer, per coordinate that it keeps
+    features: int = 64  # of each layer
     length_scales: list[float] = default(
         default_factory=lambda: [0.35, 0.7, 1.4]
     )  # of the scaled data, which fill [-1, 1]
@@ -468,12 +525,44 @@ class FlowChart(ChartConfig):
 
 
 @dataclass
+class InjectiveVaeChart(ChartConfig):
+    """Injective decoder of a variational auto-encoder, Eq. (6.1)-(6.3), trained first and then left as it is.
+
+    Numbers are those of Sec. 6.4.5, unless a comment says otherwise.
+    """
+
+    latent_dim: int = 2
+    layers: int = 3  # spline couplings
+    bins: int = 10  # of each spline
+    bound: float = 10.0  # splines end there, and are the identity beyond
+    filled: float = 0.3  # share of the bound that half the data's longest side takes; not in the thesis
+    blocks: int = 2  # of the residual network of each coupling
+    units: int = 30  # width of these
+    code_flow: FlowChart | None = None  # from codes to where contraction is claimed; null: none, as in the thesis
+
+    def __post_init__(self) -> None:
+        _require_positive("chart", self, "latent_dim", "layers", "blocks", "units", "bound")
+        _require(self.bins >= 2, "chart.bins", self.bins, "2 or more")
+        _require(0 < self.filled < 1, "chart.filled", self.filled, "a share above 0, below 1")
+
+
+@dataclass
 class FieldConfig:
     """A vector field in the chart's coordinates."""
 
 
 @dataclass
-class LinearField(FieldConfig):
+class ExactField(FieldConfig):
+    """Contracting by construction, in all dimensions also where the skill has fewer."""
+
+    skill_dim: int | None = None  # d, coordinates of the skill; null: all
+    transverse_rate_per_duration: float = 16.0  # k, at which the remaining coordinates decay
+    transverse_start: float = 0.05  # share of k at the start of a motion, where there is a time law
+    transverse_rise: float = 0.4  # share of the duration over which all of k comes in
+
+
+@dataclass
+class LinearField(ExactField):
     """ż = A z, sym A ≼ -rate I: contracting by construction."""
 
     min_rate_per_duration: float = 2.0  # certified rate, in units of 1 / mean demonstration duration
@@ -484,7 +573,7 @@ class LinearField(FieldConfig):
 
 
 @dataclass
-class PotentialField(FieldConfig):
+class PotentialField(ExactField):
     """ż = -∇φ(z) + S z, φ strongly convex: a linear field and saturating pulls; contracting by construction."""
 
     units: int = 32  # saturating pulls
@@ -846,10 +935,14 @@ class TrainingConfig:
     log_every_steps: int = 20
 
     def __post_init__(self) -> None:
-        _require_positive(
-            "training", self, "steps", "learning_rate", "ramp_steps", "gradient_clip", "checkpoint_every_steps",
-            "log_every_steps",
-        )  # fmt: skip
+        _require_schedule("training", self)
+
+
+def _require_schedule(prefix: str, training: TrainingConfig) -> None:
+    _require_positive(
+        prefix, training, "steps", "learning_rate", "ramp_steps", "gradient_clip", "checkpoint_every_steps",
+        "log_every_steps",
+    )  # fmt: skip
 
 
 @dataclass
@@ -863,6 +956,7 @@ class TrajectoryTraining(TrainingConfig):
     nearest_point_weight: float = 5.0  # squared distance between whole curves
     nearest_point_mean_weight: float = 1.5  # distance between whole curves
     end_weight: float = 12.0  # squared distance to the last point of a demonstration at its duration
+    projection_weight: float = 20.0  # squared distance of a shown state to its skill coordinates alone
     velocity_weight: float = 0.3
     haste_weight: float = 0.02  # on speeds above the fastest demonstrated one, around the demonstrations
     weight_penalty: float = 3e-5  # on the chart's squared parameters
@@ -882,7 +976,14 @@ class TrajectoryTraining(TrainingConfig):
         _require(self.surroundings >= 0, "training.surroundings", self.surroundings, "0 or more")
         _require(self.starts >= 2, "training.starts", self.starts, "2 or more")
         _require(self.curve_points >= 2, "training.curve_points", self.curve_points, "2 or more")
-        for name in ("end_weight", "velocity_weight", "haste_weight", "weight_penalty", "start_noise"):
+        for name in (
+            "end_weight",
+            "projection_weight",
+            "velocity_weight",
+            "haste_weight",
+            "weight_penalty",
+            "start_noise",
+        ):
             _require(getattr(self, name) >= 0, f"training.{name}", getattr(self, name), "0 or more")
         for name in ("warm_up", "mixing"):
             _require(0 <= getattr(self, name) <= 1, f"training.{name}", getattr(self, name), "a share between 0 and 1")
@@ -906,6 +1007,22 @@ class VelocityTraining(TrainingConfig):
         _require_positive("training", self, "batch_points", "curl_points")
         for name in ("curl_weight", "curl_margin", "contraction_weight", "contraction_reserve_per_duration"):
             _require(getattr(self, name) >= 0, f"training.{name}", getattr(self, name), "0 or more")
+
+
+@dataclass
+class VaeTraining(TrainingConfig):
+    """The evidence lower bound of states, of which an injective decoder is learned before the field, Algorithm 1."""
+
+    steps: int = 2000
+    learning_rate: float = 3e-3
+    batch_points: int = 256
+    decoder_std: float = 0.03  # of each coordinate, in units of half the data's longest side
+    divergence_weight: float = 1.0  # of the divergence from the prior
+
+    def __post_init__(self) -> None:
+        _require_schedule("vae", self)
+        _require_positive("vae", self, "batch_points", "decoder_std")
+        _require(self.divergence_weight >= 0, "vae.divergence_weight", self.divergence_weight, "0 or more")
 
 
 @dataclass
@@ -987,6 +1104,17 @@ class Avoidance(ObstacleConfig):
 
     def __post_init__(self) -> None:
         _require_positive("obstacle", self, "reactivity", "recovery_time_s")
+
+
+@dataclass
+class PolicyConfig:
+    """What an exported policy says far from the demonstrations, and does about a ball that it is told of."""
+
+    range_margin: float = 0.5  # around the demonstrations, of half their longest side, from where on it says `outside`
+    obstacle: Avoidance = default(default_factory=Avoidance)
+
+    def __post_init__(self) -> None:
+        _require(self.range_margin >= 0, "policy.range_margin", self.range_margin, "0 or more")
 
 
 @dataclass
@@ -1133,6 +1261,42 @@ def _body(body: Any) -> SolidObstacle:
     return solid
 
 
+@dataclass
+class SafetyConfig:
+    """Where a skill of two dimensions may go."""
+
+
+@dataclass
+class NoSafety(SafetyConfig):
+    """Anywhere; obstacles are avoided in the coordinates of the state."""
+
+
+@dataclass
+class RiemannianSafety(SafetyConfig):
+    """Where the volume of the metric is small, Sec. 6.3: near the data, and out of obstacles, which are pulled back."""
+
+    rho: float = 1.0  # ρ, the distance at which nothing gets nearer
+    nu: float = 10.0  # ν, the distance from which on nothing is changed
+    steepness: float = 2.0  # k of the sigmoid between them
+    support_quantile: float = 1.0  # share of the demonstrated states at which the support alone changes nothing
+    density_bandwidth: float = 0.5  # of the demonstrations' density, times their mean latent distance
+    density_power: float = 1.0  # p of f = (ρ₉₀/ρ)^p, by which lengths are multiplied
+    obstacle_gain: float = 100.0  # ζ of (3.15)
+    margin_m: float = 0.0  # distance to obstacles that counts as inside, beside what the size of a cell demands
+    points_per_axis: int = 100
+    starts: int = 1000  # random ones that it is judged by
+
+    def __post_init__(self) -> None:
+        _require_positive(
+            "safety", self, "starts", "rho", "steepness", "density_bandwidth", "density_power", "obstacle_gain"
+        )
+        _require(self.nu > self.rho, "safety.nu", self.nu, f"more than safety.rho={self.rho}")
+        share = self.support_quantile
+        _require(0 < share <= 1, "safety.support_quantile", share, "a share above 0, at most 1")
+        _require(self.margin_m >= 0, "safety.margin_m", self.margin_m, "0 or more")
+        _require(self.points_per_axis >= 20, "safety.points_per_axis", self.points_per_axis, "20 or more")
+
+
 class SolverMethod(Enum):
     """How a trajectory is computed from a field."""
 
@@ -1166,6 +1330,7 @@ class RolloutConfig:
     points: int | None = None  # null: as many as the demonstration has
     condition: list[float] | None = None  # null: each demonstration's own; for fields with conditions
     switches: list[Any] = default(default_factory=list)  # of the condition on the way: [{time_s:1.0,condition:[…]},…]
+    transition_s: float | None = 1.0  # from a start to the manifold of a decoder, Sec. 6.4.2; null: none, Algorithm 2
 
     def __post_init__(self) -> None:
         _check_switches(self.switches)
@@ -1178,8 +1343,9 @@ class RolloutConfig:
             _require(
                 numbers, "rollout.starts_m", self.starts_m, "lists of coordinates, for example [[0.1,0.2],[0,0.3]]"
             )
-        if self.duration_s is not None:
-            _require_positive("rollout", self, "duration_s")
+        for name in ("duration_s", "transition_s"):
+            if getattr(self, name) is not None:
+                _require_positive("rollout", self, name)
         if self.points is not None:
             _require(self.points >= 2, "rollout.points", self.points, "2 or more")
 
@@ -1207,6 +1373,19 @@ class Protocol(Enum):
 
 
 @dataclass
+class PushesConfig:
+    """Pushes of the position that a motion in space has to recover from, in random directions."""
+
+    count: int = 100
+    size_m: float = 0.05
+    at: float = 0.4  # share of the mean duration
+
+    def __post_init__(self) -> None:
+        _require_positive("evaluation.pushes", self, "count", "size_m")
+        _require(0 <= self.at < 1, "evaluation.pushes.at", self.at, "a share from 0, below 1")
+
+
+@dataclass
 class EvaluationConfig:
     """Scores and the grids on which they are taken."""
 
@@ -1220,7 +1399,9 @@ class EvaluationConfig:
     nearby_spread: float = 0.05  # of the diagonal
     goal_tolerance: float = 0.02  # of the diagonal
     goal_duration: float = 3.0  # times the mean duration, after which a start counts as never reaching the goal
+    timed_steps: int = 0  # single integration steps of the thesis' way that are timed beside ours, Table 6.3; 0: none
     verify_cells: int = 5000  # tried to prove contraction on the box, where it is not by construction; 0: not tried
+    pushes: PushesConfig = default(default_factory=PushesConfig)
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -1231,7 +1412,8 @@ class EvaluationConfig:
         for name in ("grid_margin", "region_margin"):
             value = getattr(self, name)
             _require(value >= 0, f"evaluation.{name}", value, "0 or more")
-        _require(self.verify_cells >= 0, "evaluation.verify_cells", self.verify_cells, "0 or more")
+        for name in ("verify_cells", "timed_steps"):
+            _require(getattr(self, name) >= 0, f"evaluation.{name}", getattr(self, name), "0 or more")
         _require_seed("evaluation.", self)
 
 
@@ -1258,7 +1440,7 @@ class ReferenceRow:
 
     variant: str = MISSING
     dataset: str = MISSING
-    values: list[float] = MISSING
+    values: list[float | None] = MISSING  # null: they give none
 
 
 @dataclass
@@ -1337,31 +1519,107 @@ class CheckConfig:
 
 
 @dataclass
-class RobotConfig:
-    """The simulated arm."""
+class SimulationConfig:
+    """The simulated arm, whatever leads it."""
+
+    KEY: ClassVar[str] = "robot"
 
     frame: EndEffectorFrame = EndEffectorFrame.grasp_target  # of the Panda, for poses
-    timing: TimingLaw = TimingLaw.demonstration
     duration_s: float | None = None  # null: the mean duration of the demonstrations
-    share_of_limits: float = 0.5  # of velocity, acceleration and jerk, for timing=fastest
     table: bool = False  # recordings do not say where their table stood; true: one with its top at z = 0
     film: bool = True
     film_fps: float = 10.0
+    control_hz: float = 60.0  # divides 240
+
+    def __post_init__(self) -> None:
+        _require_positive(self.KEY, self, "film_fps", "control_hz")
+        if self.duration_s is not None:
+            _require_positive(self.KEY, self, "duration_s")
+
+
+@dataclass
+class RobotConfig(SimulationConfig):
+    """The simulated arm on a planned path."""
+
+    timing: TimingLaw = TimingLaw.demonstration
+    share_of_limits: float = 0.5  # of velocity, acceleration and jerk, for timing=fastest
     tool_length_m: float | None = (
         None  # of the grasped object, a cylinder; null: as long as the ball is that plans have
     )
     closed_loop: bool | None = None  # replan while moving; null: where an obstacle moves
-    control_hz: float = 60.0
     horizon_s: float = 1.0  # how far ahead moving obstacles are looked at
 
     def __post_init__(self) -> None:
-        _require_positive("robot", self, "film_fps", "control_hz")
+        super().__post_init__()
         if self.tool_length_m is not None:
             _require_positive("robot", self, "tool_length_m")
         _require(0 < self.share_of_limits <= 1, "robot.share_of_limits", self.share_of_limits, "above 0, at most 1")
         _require(self.horizon_s >= 0, "robot.horizon_s", self.horizon_s, "0 or more")
-        if self.duration_s is not None:
-            _require_positive("robot", self, "duration_s")
+
+
+class ForceProfile(Enum):
+    """How the force of a push changes while it lasts."""
+
+    constant = "constant"
+    half_sine = "half_sine"  # `force_n` is the largest
+
+
+@dataclass
+class PushConfig:
+    """A push of the arm's tip: a force for a while, or a displacement at once."""
+
+    time_s: float = MISSING  # since the start of the motion
+    duration_s: float = 0.25
+    force_n: list[float] | None = None  # in the base frame
+    displacement_m: list[float] | None = None  # instead of a force
+    profile: ForceProfile = ForceProfile.constant
+
+    def __post_init__(self) -> None:
+        _require(self.time_s >= 0, "replay.pushes.time_s", self.time_s, "0 or more")
+        _require_positive("replay.pushes", self, "duration_s")
+        given = [vector for vector in (self.force_n, self.displacement_m) if vector is not None]
+        _require(len(given) == 1, "replay.pushes", given, "force_n or displacement_m, one of them")
+        _require(_are_finite(given[0]) and len(given[0]) == 3, "replay.pushes", given[0], "three finite numbers")
+
+
+@dataclass
+class GoalChangeConfig:
+    """The goal is elsewhere from a time on."""
+
+    time_s: float = MISSING  # since the start of the motion
+    shift_m: list[float] = MISSING  # from where it was learned
+
+    def __post_init__(self) -> None:
+        _require(self.time_s >= 0, "replay.goal_changes.time_s", self.time_s, "0 or more")
+        is_vector = _are_finite(self.shift_m) and len(self.shift_m) == 3
+        _require(is_vector, "replay.goal_changes.shift_m", self.shift_m, "three finite numbers")
+
+
+@dataclass
+class ReplayConfig(SimulationConfig):
+    """The learned policy in closed loop on the simulated Panda, and what disturbs it there."""
+
+    KEY: ClassVar[str] = "replay"
+
+    duration_s: float | None = None  # null: a quarter longer than the demonstration that it starts as
+    start: Any = None  # demo:N (its first state), or a state; null: that of a held-out demonstration
+    damping_n_s_per_m: float = 100.0  # force at the tip over the velocity at which the arm yields to it
+    pushes: list[PushConfig] | None = None  # null: one of 5 cm across the motion, at 40 % of it; []: none
+    goal_changes: list[GoalChangeConfig] = default(default_factory=list)
+    noise_m: float = 0.0  # standard deviation of each measured coordinate of the position
+    noise_rad: float = 0.0  # of each measured coordinate of the orientation, or of each joint
+    latency_s: float = 0.0  # how old what is measured is, in whole control periods
+    clearance_m: float = 0.08  # by which obstacles grow for the tip: what it carries along is larger
+    seed: int = 0  # of the noise
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("replay", self, "damping_n_s_per_m")
+        for name in ("noise_m", "noise_rad", "latency_s", "clearance_m"):
+            _require(getattr(self, name) >= 0, f"replay.{name}", getattr(self, name), "0 or more")
+        times = [change.time_s for change in self.goal_changes]
+        _require(sorted(set(times)) == times, "replay.goal_changes", times, "times in order")
+        _require_seed("replay.", self)
 
 
 @dataclass
@@ -1431,15 +1689,21 @@ class GmsConfig(CommandConfig):
 class NcdsConfig(CommandConfig):
     """Configuration of every `ncds` verb."""
 
+    space: PoseSpace | None = None  # null: dataset.state_channels
+    pose: PoseConfig = default(default_factory=PoseConfig)
     chart: ChartConfig = MISSING
     field: FieldConfig = MISSING
     regulariser: RegulariserConfig = MISSING
     time_law: TimeLawConfig = MISSING
     training: TrainingConfig = MISSING
+    vae: VaeTraining = default(default_factory=VaeTraining)  # for chart=injective_vae
     obstacle: ObstacleConfig = MISSING
+    safety: SafetyConfig = MISSING
     solver: SolverConfig = default(default_factory=SolverConfig)
     rollout: RolloutConfig = default(default_factory=RolloutConfig)
+    replay: ReplayConfig = default(default_factory=ReplayConfig)
     evaluation: EvaluationConfig = default(default_factory=EvaluationConfig)
+    policy: PolicyConfig = default(default_factory=PolicyConfig)
 
 
 def plain(value: object) -> Any:
@@ -1470,7 +1734,7 @@ def _dataset_choices() -> dict[str, dict[str, Any]]:
     return {
         "lasa": {choice: {"shapes": shapes} for choice, shapes in lasa.items()}
         | conditioned
-        | {"angle_to_targets": to_targets},
+        | {"angle_to_targets": to_targets, "pose": {"defaults": ["lasa_pose_schema", "_self_"]}},
         "robotasks9": {task: {"task": task} for task in ROBOTASKS9_TASKS} | {"other": {}},
         "robotasks9_joint": {task: {"task": task} for task in ROBOTASKS9_TASKS} | {"other": {}},
         "letters": {letter: {"letter": letter} for letter in LETTERS},
@@ -1499,7 +1763,14 @@ def register() -> None:
     store(name="gms_schema", node=GmsConfig)
     store(name="ncds_schema", node=NcdsConfig)
     choices: dict[str, dict[str, Any]] = {
-        "chart": {"identity": IdentityChart, "flow": FlowChart},
+        "chart": {
+            "identity": IdentityChart,
+            "flow": FlowChart,
+            # for demonstrations that scatter: what a wiggly chart would learn by heart are their starts
+            "smooth": FlowChart(length_scales=[1.4, 2.8]),
+            "injective_vae": InjectiveVaeChart,
+            "injective_vae_flow": InjectiveVaeChart(code_flow=FlowChart()),
+        },
         "field": {
             "linear_schema": LinearField,
             "potential_schema": PotentialField,
@@ -1514,7 +1785,12 @@ def register() -> None:
             "eigenvalue": EigenvalueRegulariser,
         },
         "time_law": {"none": NoTimeLaw, "learned": LearnedTimeLaw},
-        "training": {"trajectory": TrajectoryTraining, "velocity": VelocityTraining, "adjoint": AdjointTraining},
+        "training": {
+            "trajectory": TrajectoryTraining,
+            "scattered": TrajectoryTraining(steps=300, mixing=1.0, start_noise=0.1, weight_penalty=1e-2),
+            "velocity": VelocityTraining,
+            "adjoint": AdjointTraining,
+        },
         "arm": {"panda": PandaArm, "planar_2dof": PlanarArm, "urdf": UrdfArm},
         "obstacle": {
             "none": NoObstacle,
@@ -1526,10 +1802,12 @@ def register() -> None:
             "point_cloud": PointCloudObstacle(centre_m=[0.0, 0.0, 0.0]),
             "several": SeveralObstacles,
         },
+        "safety": {"none": NoSafety, "riemannian": RiemannianSafety},
         "evaluation": {"heldout": EvaluationConfig, "peers": EvaluationConfig(protocol=Protocol.peers)},
         "dataset": {
             "folder": FolderDataset(name="folder"),
             "lasa_schema": LasaDataset,
+            "lasa_pose_schema": LasaPoseDataset,
             "robotasks9_schema": RoboTasks9Dataset,
             "robotasks9_joint_schema": RoboTasks9JointDataset,
             "letters_schema": LettersDataset,

@@ -1,9 +1,7 @@
-"""A trained field as an ONNX file: one velocity per state, for control loops without Python or torch.
-
-A field with conditions takes the condition as a further input, one with a time law the time since the start.
-"""
+"""A policy as an ONNX file: one query per state, for control loops without our library or torch."""
 
 import contextlib
+import copy
 import io
 import logging
 import statistics
@@ -16,49 +14,51 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from geomotion.conditional_models import ConditionalPolicy
-from geomotion.dynamics.fields import ChartedField
-from geomotion.files import atomic
+from geomotion.dynamics.line_integral import LineIntegralField
+from geomotion.dynamics.quadrature import GaussLegendre
+from geomotion.files import write_bytes
+from geomotion.policy.policy import Policy
 
-INPUT, CONDITION, ELAPSED, OUTPUT = "state_m", "condition", "elapsed_s", "velocity_m_per_s"
-ARGUMENTS = {INPUT: "x", CONDITION: "condition", ELAPSED: "elapsed_s"}  # of the fields, for each input of the file
+Arrays = Mapping[str, NDArray[np.float32]]
 WARM_UP_QUERIES, TIMED_QUERIES = 200, 1000
+EXPORTED_NODES = 20  # of the quadrature that stands for a solver
+ERRORS_ONLY = 3  # of onnxruntime, which otherwise remarks that inputs with a default are not constants
 
 
-def export_onnx(field: ChartedField | ConditionalPolicy, path: Path) -> None:
-    """Write a field in single precision.
+def export_onnx(policy: Policy, path: Path) -> None:
+    """Write a policy in single precision, with the inputs and outputs that it names, for any number of states.
 
-    Inputs are ``state_m`` of shape (batch, D), where there are conditions ``condition`` of shape (batch, K), and with a
-    time law ``elapsed_s`` of shape (batch, 1); the output is ``velocity_m_per_s`` of shape (batch, D).
+    Inputs with a default may be left out, and have one row for all states. A solver's loop, which cannot be exported,
+    becomes a quadrature.
     """
-    widths = input_widths(field)
-    examples = {name: torch.zeros(2, width) for name, width in widths.items()}  # one row would fix the batch size
-    with _quiet(), atomic(path) as temporary, torch.no_grad():
+    from onnx import numpy_helper
+
+    recorded = _without_solver(policy).float().eval()
+    # one row would fix the batch size
+    examples = tuple(torch.zeros(2 if one.default is None else 1, one.width) for one in recorded.inputs)
+    batch = torch.export.Dim("batch")
+    shapes = tuple({0: batch} if one.default is None else {} for one in recorded.inputs)
+    with _quiet(), torch.no_grad():
+        recorded(*examples)  # what is computed once and kept, such as where the goal is, must not be recorded
         program = torch.onnx.export(
-            field.float().eval(),
-            kwargs={ARGUMENTS[name]: example for name, example in examples.items()},
-            input_names=list(widths),
-            output_names=[OUTPUT],
-            dynamic_shapes={ARGUMENTS[name]: {0: torch.export.Dim("batch")} for name in widths},
+            recorded,
+            examples,
+            input_names=[one.name for one in recorded.inputs],
+            output_names=[one.name for one in recorded.outputs],
+            dynamic_shapes=(shapes,),
             dynamo=True,
             verbose=False,
         )
-        assert program is not None
-        program.save(str(temporary), external_data=False)
-
-
-def input_widths(field: ChartedField | ConditionalPolicy) -> dict[str, int]:
-    """Columns of each input, in their order."""
-    widths = {INPUT: field.dim}
-    if isinstance(field, ConditionalPolicy):
-        widths[CONDITION] = field.condition_dim
-    if field.time_law is not None:
-        widths[ELAPSED] = 1
-    return widths
+    assert program is not None
+    model = program.model_proto
+    for one in recorded.inputs:
+        if one.default is not None:
+            model.graph.initializer.append(numpy_helper.from_array(np.array([one.default], np.float32), one.name))
+    write_bytes(path, model.SerializeToString())
 
 
 class OnnxPolicy:
-    """An exported field, one thread, ready for a control loop.
+    """An exported policy, one thread, ready for a control loop.
 
     Args:
         path: File that :func:`export_onnx` wrote.
@@ -69,26 +69,33 @@ class OnnxPolicy:
 
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.log_severity_level = ERRORS_ONLY
         self.session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        self._outputs = [one.name for one in self.session.get_outputs()]
 
-    def __call__(self, *inputs: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Velocities [m/s] at states [m], then conditions and times since the start [s], where the field takes them."""
-        names = [one.name for one in self.session.get_inputs()]
-        velocities: NDArray[np.float32] = self.session.run(None, dict(zip(names, inputs, strict=True)))[0]
-        return velocities
+    def __call__(self, inputs: Arrays) -> dict[str, NDArray[np.float32]]:
+        """Outputs by name, from inputs by name."""
+        return dict(zip(self._outputs, self.session.run(None, inputs), strict=True))
 
 
-def query_time_ms(policy: OnnxPolicy, widths: Mapping[str, int]) -> float:
-    """Median time of one velocity at one state [ms]; `widths` as of :func:`input_widths`."""
-    inputs = [np.zeros((1, width), dtype=np.float32) for width in widths.values()]
+def query_time_ms(policy: OnnxPolicy, inputs: Arrays) -> float:
+    """Median time of one query [ms], over a thousand."""
     for _ in range(WARM_UP_QUERIES):
-        policy(*inputs)
+        policy(inputs)
     times = []
     for _ in range(TIMED_QUERIES):
         begun = time.perf_counter()
-        policy(*inputs)
+        policy(inputs)
         times.append(time.perf_counter() - begun)
     return 1000 * statistics.median(times)
+
+
+def _without_solver(policy: Policy) -> Policy:
+    policy = copy.deepcopy(policy)
+    for module in policy.modules():
+        if isinstance(module, LineIntegralField) and not isinstance(module.integrator, GaussLegendre):
+            module.integrator = GaussLegendre(EXPORTED_NODES)
+    return policy
 
 
 @contextlib.contextmanager

@@ -1,7 +1,7 @@
 """Models from configuration, and the file they are kept in."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from dataclasses import field as default
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,12 @@ from torch import nn
 from geomotion import config as schema
 from geomotion.baselines.unconstrained import UnconstrainedLineIntegral
 from geomotion.baselines.velocity_network import VelocityNetwork
-from geomotion.dynamics.charts import AnchoredChart, ComposedChart, IdentityChart, ScalingChart
+from geomotion.dynamics.charts import AnchoredChart, ComposedChart, IdentityChart, ScalingChart, TurnedChart
 from geomotion.dynamics.conditional import ConditionalLineIntegral, Standing
+from geomotion.dynamics.conditional_linear import ConditionalLinear
+from geomotion.dynamics.embedded import EmbeddedField, RisingClock
 from geomotion.dynamics.fields import Chart, ChartedField, VectorField
+from geomotion.dynamics.injective import DecoderChart, decoded
 from geomotion.dynamics.line_integral import DormandPrince, LineIntegralField, LineIntegrator, RungeKutta4
 from geomotion.dynamics.linear import LinearField
 from geomotion.dynamics.potential import PotentialField
@@ -27,11 +30,13 @@ from geomotion.dynamics.regularisers import (
     StateIndependentRegulariser,
     unequal_roots,
 )
-from geomotion.dynamics.time_law import SplineTimeLaw
+from geomotion.dynamics.time_law import ConditionalTimeLaw, SplineTimeLaw
 from geomotion.errors import CorruptArtefact, InvalidSetting
 from geomotion.files import write_tensors
+from geomotion.lie.poses import PoseCoordinates
 from geomotion.networks.coupling import CouplingFlow
 from geomotion.networks.mlp import MLP, JacobianRoot, SkewMatrix
+from geomotion.networks.spline_flow import SplineFlow
 from geomotion.training.data import Geometry
 
 BY_CONSTRUCTION = "this field contracts by construction; its rate is at least field.min_rate_per_duration"
@@ -68,6 +73,7 @@ class Skill:
         state_channels: Channels of the demonstrations that make up the state.
         train_demos: Numbers of the demonstrations it was fitted to.
         test_demos: Numbers of those that were held out.
+        pose: What turns poses into states, where these are poses.
     """
 
     field: ChartedField
@@ -76,6 +82,7 @@ class Skill:
     state_channels: tuple[str, ...]
     train_demos: tuple[int, ...]
     test_demos: tuple[int, ...]
+    pose: PoseCoordinates | None = None
 
     @property
     def goal(self) -> torch.Tensor:
@@ -90,18 +97,23 @@ def build(config: ModelConfig, geometry: Geometry) -> ChartedField:
         InvalidSetting: If chart, field and regulariser do not go together, or the field knows no conditions.
     """
     context = geometry.context
+    if isinstance(config.chart, schema.InjectiveVaeChart):
+        decoder = build_decoder(config.chart, geometry, config.seed)
+        codes = Geometry.of_prior(config.chart.latent_dim, geometry.duration_s)
+        return decoded(decoder, build(of_codes(config), codes))
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         scaling = ScalingChart(torch.tensor(geometry.centre), geometry.scale_m)
         dim = scaling.dim - context
-        chart = ComposedChart(scaling, _chart(config.chart, dim, context))
+        chart = ComposedChart(scaling, _chart(config.chart, dim, geometry))
         match config.field:
             case schema.LinearField() | schema.PotentialField() as exact:
                 _refuse_regulariser(config.regulariser, BY_CONSTRUCTION)
                 anchored: Chart = AnchoredChart(chart, torch.tensor(geometry.goal))
-                exact_field = _exact_field(exact, dim)
-                field: VectorField = Standing(exact_field, context) if context else exact_field
-                return ChartedField(anchored, field, geometry.duration_s, _time_law(config.time_law))
+                field, law = _exact_field(exact, dim, context), _time_law(config.time_law, context)
+                has_own_clock = isinstance(field, EmbeddedField) and law is not None
+                transverse = RisingClock(exact.transverse_start, exact.transverse_rise) if has_own_clock else None
+                return ChartedField(anchored, field, geometry.duration_s, law, transverse)
             case _ if not isinstance(config.time_law, schema.NoTimeLaw):
                 raise InvalidSetting("time_law", "learned", "none, but for field=linear and field=potential")
             case schema.VelocityNetworkField() as network:
@@ -118,18 +130,47 @@ def build(config: ModelConfig, geometry: Geometry) -> ChartedField:
                 raise TypeError(f"no builder for {type(unknown).__name__}")
 
 
-def _time_law(config: schema.TimeLawConfig) -> SplineTimeLaw | None:
-    return SplineTimeLaw(config.knots, config.min_speed) if isinstance(config, schema.LearnedTimeLaw) else None
+def build_decoder(config: schema.InjectiveVaeChart, geometry: Geometry, seed: int) -> DecoderChart:
+    """An untrained decoder of states, which are scaled into the range of its splines.
+
+    Raises:
+        InvalidSetting: If states have no more coordinates than codes, or belong to conditions.
+    """
+    _refuse_conditions(geometry.context, "chart=flow or chart=identity")
+    dim = len(geometry.centre)
+    if config.latent_dim >= dim:
+        raise InvalidSetting("chart.latent_dim", config.latent_dim, f"fewer than the {dim} coordinates of a state")
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        flow = SplineFlow(dim, config.layers, config.bins, config.bound, config.blocks, config.units)
+    scaling = ScalingChart(torch.tensor(geometry.centre), geometry.scale_m / (config.filled * config.bound))
+    return DecoderChart(scaling, flow, config.latent_dim)
 
 
-def _refuse_conditions(context: int) -> None:
+def of_codes(config: ModelConfig) -> ModelConfig:
+    """The model that is learned of codes where there is a decoder; otherwise the same as that of states."""
+    if not isinstance(config.chart, schema.InjectiveVaeChart):
+        return config
+    return replace(config, chart=schema.IdentityChart() if config.chart.code_flow is None else config.chart.code_flow)
+
+
+def _time_law(config: schema.TimeLawConfig, context: int) -> SplineTimeLaw | ConditionalTimeLaw | None:
+    if not isinstance(config, schema.LearnedTimeLaw):
+        return None
+    settings = config.knots, config.min_speed
+    return ConditionalTimeLaw(context, *settings) if context else SplineTimeLaw(*settings)
+
+
+FIELDS_WITH_CONDITIONS = "a field that knows them: field=linear, potential or line_integral"
+
+
+def _refuse_conditions(context: int, expected: str = FIELDS_WITH_CONDITIONS) -> None:
     if context:
-        raise InvalidSetting(
-            "dataset", "one with conditions", "a field that knows them: field=linear, potential or line_integral"
-        )
+        raise InvalidSetting("dataset", "one with conditions", expected)
 
 
-def _chart(config: schema.ChartConfig, dim: int, context: int) -> Chart:
+def _chart(config: schema.ChartConfig, dim: int, geometry: Geometry) -> Chart:
+    context = geometry.context
     match config:
         case schema.IdentityChart():
             return IdentityChart(dim + context)
@@ -137,16 +178,32 @@ def _chart(config: schema.ChartConfig, dim: int, context: int) -> Chart:
             if dim < 2:
                 raise InvalidSetting("chart", "flow", "at least two coordinates; use chart=identity in one dimension")
             settings = config.layers, config.features, config.length_scales, config.log_scale_cap
-            return CouplingFlow(dim, *settings, context)
+            flow = CouplingFlow(dim, *settings, context)
+            if not geometry.axes:
+                return flow
+            # halves of the principal axes say more about each other than halves of arbitrary coordinates
+            return ComposedChart(TurnedChart(torch.tensor(geometry.axes).view(dim, dim)), flow)
         case unknown:
             raise TypeError(f"no builder for {type(unknown).__name__}")
 
 
-def _exact_field(config: schema.LinearField | schema.PotentialField, dim: int) -> LinearField | PotentialField:
-    rates = config.min_rate_per_duration, config.initial_rate_per_duration
-    if isinstance(config, schema.PotentialField):
-        return PotentialField(dim, config.units, *rates)
-    return LinearField(dim, *rates)
+def _exact_field(config: schema.ExactField, dim: int, context: int) -> VectorField:
+    skill_dim = dim if config.skill_dim is None else config.skill_dim
+    if skill_dim > dim:
+        raise InvalidSetting("field.skill_dim", skill_dim, f"at most {dim}, the number of coordinates of a state")
+    match config:
+        case schema.PotentialField():
+            rates = config.min_rate_per_duration, config.initial_rate_per_duration
+            skill: LinearField | PotentialField = PotentialField(skill_dim, config.units, *rates)
+        case schema.LinearField():
+            rates = config.min_rate_per_duration, config.initial_rate_per_duration
+            if context and skill_dim == dim:
+                return ConditionalLinear(dim, context, *rates)
+            skill = LinearField(skill_dim, *rates)
+        case unknown:
+            raise TypeError(f"no builder for {type(unknown).__name__}")
+    field = skill if skill_dim == dim else EmbeddedField(skill, dim, config.transverse_rate_per_duration)
+    return Standing(field, context) if context else field
 
 
 def _line_integral(
@@ -224,6 +281,7 @@ def save(path: Path, skill: Skill, conditioning: Mapping[str, Any] | None = None
         "test_demos": list(skill.test_demos),
         "parameters": skill.field.state_dict(),
         "conditioning": conditioning,
+        "pose": None if skill.pose is None else skill.pose.document(),
     }
     write_tensors(path, document)
 
@@ -270,6 +328,7 @@ def load_parts(path: Path) -> tuple[Skill, Mapping[str, Any] | None]:
         tuple(document["state_channels"]),
         tuple(document["train_demos"]),
         tuple(document["test_demos"]),
+        None if document.get("pose") is None else PoseCoordinates.from_document(document["pose"]),
     )
     return skill, document.get("conditioning")
 
@@ -286,14 +345,14 @@ def _model_config(document: Mapping[str, Any]) -> ModelConfig:
 def _component(document: Mapping[str, Any]) -> Any:
     """A configuration object from its plain form; the set of kinds is closed."""
     kinds: Sequence[type] = (
-        schema.IdentityChart, schema.FlowChart,
+        schema.IdentityChart, schema.FlowChart, schema.InjectiveVaeChart,
         schema.LinearField, schema.PotentialField, schema.LineIntegralField, schema.VelocityNetworkField,
         schema.NoRegulariser, schema.ConstantRegulariser, schema.StateIndependentRegulariser,
         schema.StateDependentRegulariser, schema.EigenvalueRegulariser,
         schema.NoTimeLaw, schema.LearnedTimeLaw,
     )  # fmt: skip
     kind = {kind.__name__: kind for kind in kinds}[document["kind"]]
-    values = {name: value for name, value in document.items() if name != "kind"}
+    values = {name: _value(value) for name, value in document.items() if name != "kind"}
     for name, enum in (
         ("activation", schema.Activation), ("base_point", schema.BasePoint),
         ("base_velocity", schema.BaseVelocity), ("integrator", schema.Integrator),
@@ -302,3 +361,7 @@ def _component(document: Mapping[str, Any]) -> Any:
         if name in values:
             values[name] = enum(values[name])
     return kind(**values)
+
+
+def _value(document: Any) -> Any:
+    return _component(document) if isinstance(document, Mapping) else document

@@ -7,6 +7,7 @@ __all__ = [
     "Bool",
     "Float",
     "Int",
+    "Latent",
     "Matrix",
     "State",
     "States",
@@ -18,6 +19,7 @@ __all__ = [
 
 State = Float[Tensor, "*batch D"]  # robot coordinates [m] unless a docstring says otherwise
 Velocity = Float[Tensor, "*batch D"]  # [m/s]
+Latent = Float[Tensor, "*batch d"]  # coordinates of a chart [-], as many as the state has or fewer
 Matrix = Float[Tensor, "*batch D D"]
 States = Float[Tensor, "point D"]
 Times = Float[Tensor, " time"]  # [s], increasing

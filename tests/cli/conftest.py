@@ -40,8 +40,8 @@ class Answer:
 
     @property
     def complaints(self) -> list[str]:
-        """Lines of standard error, less those that tell how far the stages are and how well a toy is learned."""
-        progress = (": done in", ": reused", "latent space of attempt")
+        """Lines of standard error, less those that tell how far the stages are and how a toy is learned."""
+        progress = (": done in", ": reused", "latent space of attempt", "train: broke down at step")
         return [line for line in self.err.splitlines() if not any(words in line for words in progress)]
 
     def run_id(self, stage: str) -> str:

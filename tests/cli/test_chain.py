@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +39,7 @@ class TestRun:
             "train": ["model.pt", "training.csv", "certificate.json"],
             "rollout": ["rollouts/meta/info.json", "rollouts.json"],
             "evaluate": ["scores.json", "certificate.json", "evaluation.npz"],
-            "export": ["policy.onnx", "policy.json"],
+            "export": ["policy.onnx", "policy.json", "policy_example.py"],
             "report": ["report.html"],
         }.items():
             for name in [*names, "config.json", "environment.json"]:
@@ -82,7 +84,13 @@ class TestRun:
             expected = skill.field(box, elapsed_s).numpy()
         scale = np.abs(expected).max()
         found = policy.predict({"state_m": box.numpy(), "elapsed_s": elapsed_s.numpy()})
-        np.testing.assert_allclose(found, expected, atol=1e-5 * scale)
+        np.testing.assert_allclose(found["velocity_m_per_s"], expected, atol=1e-5 * scale)
+
+    def test_the_example_beside_the_policy_follows_it_to_the_goal(self, linear):
+        script = linear.artefact("export", "policy_example.py")
+        assert "geomotion" not in script.read_text()
+        told = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True).stdout
+        assert re.fullmatch(r"0\.\d+ ms a query, worst status 0, 0\.00\d+ from the goal at the end\n", told)
 
     def test_standard_error_tells_the_stages_and_nothing_else(self, linear):
         assert [line.partition(":")[0] for line in linear.err.splitlines()] == list(STAGES)

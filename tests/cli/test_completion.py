@@ -60,7 +60,7 @@ def test_only_what_stands_before_the_cursor_counts(offered):
 
 
 def test_fish_gets_lines(offered):
-    assert offered("ncds re", shell="fish")[0] == "report"
+    assert offered("ncds re", shell="fish")[0] == "replay"
 
 
 def test_an_unreadable_line_offers_nothing_and_says_nothing(offered):

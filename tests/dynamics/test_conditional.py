@@ -8,18 +8,19 @@ from torch.testing import assert_close
 
 from geomotion.dynamics.charts import AnchoredChart, ComposedChart, ScalingChart
 from geomotion.dynamics.conditional import ConditionalLineIntegral, Standing, given
+from geomotion.dynamics.conditional_linear import ConditionalLinear
 from geomotion.dynamics.fields import ChartedField
 from geomotion.dynamics.line_integral import LineIntegralField
-from geomotion.dynamics.linear import LinearField
 from geomotion.dynamics.potential import PotentialField
 from geomotion.dynamics.quadrature import GaussLegendre
 from geomotion.dynamics.regularisers import StateDependentRegulariser
-from geomotion.dynamics.time_law import SplineTimeLaw
+from geomotion.dynamics.time_law import ConditionalTimeLaw
 from geomotion.networks.coupling import CouplingFlow
 from geomotion.networks.mlp import MLP, JacobianRoot, SkewMatrix
 from geomotion.scores.jacobians import eigenvalues_in_metric, field_jacobian
 
 CONTEXT, TIME_UNIT_S, RATE = 2, 2.0, 0.4
+FRAME = {"stretch": 0.7, "slowdown": 1.3}  # of a condition
 
 
 def disturbed(module: torch.nn.Module) -> torch.nn.Module:
@@ -33,11 +34,12 @@ def disturbed(module: torch.nn.Module) -> torch.nn.Module:
 def exact(kind: str) -> ChartedField:
     """In a flow whose origin is the goal of every condition."""
     torch.manual_seed(0)
-    inner = LinearField(2, RATE, 1.0) if kind == "linear" else PotentialField(2, 8, RATE, 1.0)
+    standing = Standing(PotentialField(2, 8, RATE, 1.0), CONTEXT)
+    field = ConditionalLinear(2, CONTEXT, RATE, 1.0) if kind == "linear" else standing
     scaling = ScalingChart(torch.zeros(2 + CONTEXT), 0.1)
     chart = ComposedChart(scaling, CouplingFlow(2, 4, 16, [0.5, 1.0], 1.5, CONTEXT))
     anchored = AnchoredChart(chart, torch.zeros(2 + CONTEXT))
-    return disturbed(ChartedField(anchored, Standing(inner, CONTEXT), TIME_UNIT_S))
+    return disturbed(ChartedField(anchored, field, TIME_UNIT_S, ConditionalTimeLaw(CONTEXT, 6, 0.2)))
 
 
 @pytest.fixture(params=["linear", "potential"])
@@ -73,23 +75,54 @@ def shift_of(condition: torch.Tensor) -> torch.Tensor:
     return torch.stack([condition[0] - condition[1], condition.square().sum()])
 
 
+def in_frame(x: torch.Tensor, condition: torch.Tensor) -> torch.Tensor:
+    """States as the joint field takes them."""
+    own = (x - shift_of(condition)) / FRAME["stretch"]
+    return torch.cat([own, condition.expand(len(x), -1)], -1)
+
+
 def test_a_fixed_condition_gives_what_the_joint_field_gives_beside_it(field):
-    x = states(12)
+    x, elapsed_s = states(12), torch.linspace(0, 4, 12, dtype=torch.float64)[:, None]
     for condition in conditions(3):
-        shift, plain = shift_of(condition), given(field, condition, shift_of(condition))
-        joint = field(torch.cat([x - shift, condition.expand(12, -1)], -1))
-        assert_close(plain(x), joint[:, :2])
+        plain = given(field, condition, shift_of(condition), **FRAME)
+        joint = field.velocity(in_frame(x, condition), elapsed_s / FRAME["slowdown"])
+        assert_close(plain.velocity(x, elapsed_s), joint[:, :2] * (FRAME["stretch"] / FRAME["slowdown"]))
         assert_close(joint[:, 2:], torch.zeros(12, CONTEXT, dtype=torch.float64), rtol=0, atol=0)
         assert_close(plain.chart.to_ambient(plain.chart.to_latent(x)), x)
 
 
 def test_trajectories_in_closed_form_keep_the_condition():
-    field, x, times = exact("linear"), states(4), torch.linspace(0, 3, 7, dtype=torch.float64)
+    field, x, times_s = exact("linear"), states(4), torch.linspace(0, 3, 7, dtype=torch.float64)
     (condition,) = conditions(1)
-    plain = given(field, condition, shift_of(condition))
-    joint = field.solve(torch.cat([x - shift_of(condition), condition.expand(4, -1)], -1), times)
-    assert_close(plain.solve(x, times), joint[..., :2] + shift_of(condition))
+    plain = given(field, condition, shift_of(condition), **FRAME)
+    joint = field.solve(in_frame(x, condition), times_s / FRAME["slowdown"])
+    assert_close(plain.solve(x, times_s), joint[..., :2] * FRAME["stretch"] + shift_of(condition))
     assert_close(joint[..., 2:], condition.expand(4, 7, -1))
+
+
+def test_states_of_several_conditions_are_followed_side_by_side():
+    field, several, times = exact("linear"), conditions(5), torch.linspace(0, 3, 7, dtype=torch.float64)
+    x = torch.cat([states(5), several], -1)
+    together = field.solve(x, times)
+    for number in range(5):
+        assert_close(together[number], field.solve(x[number : number + 1], times)[0])
+    own_times = torch.rand(5, 4, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    assert_close(field.solve(x, own_times)[2], field.solve(x[2:3], own_times[2])[0])
+
+
+def test_a_linear_field_has_a_matrix_for_each_condition_that_contracts_at_least_at_the_guaranteed_rate():
+    torch.manual_seed(1)
+    field = ConditionalLinear(3, 2, RATE, 1.0).double()
+    assert_close(field.given(torch.tensor([0.3, 0.7], dtype=torch.float64)).matrix, -torch.eye(3, dtype=torch.float64))
+    torch.nn.init.normal_(field.symmetric_roots)
+    torch.nn.init.normal_(field.skew_roots)
+    rates = []
+    for condition in 3 * torch.randn(200, 2, dtype=torch.float64):
+        plain, z = field.given(condition), torch.randn(4, 3, dtype=torch.float64)
+        assert_close(plain(z), field(torch.cat([z, condition.expand(4, -1)], -1))[:, :3])
+        rates.append(plain.rate)
+    assert min(rates) >= RATE - 1e-12
+    assert max(rates) > 1.1 * min(rates)
 
 
 def test_the_condition_moves_the_equilibrium(field):
@@ -100,12 +133,12 @@ def test_the_condition_moves_the_equilibrium(field):
         assert_close(plain.chart.to_latent(goal), torch.zeros(2, dtype=torch.float64), rtol=0, atol=1e-12)
 
 
-def test_every_condition_contracts_in_its_metric_at_the_same_proven_rate(field):
+def test_every_condition_contracts_in_its_metric_at_its_proven_rate(field):
     x = states(40)
     for condition in conditions(6):
-        plain = given(field, condition, shift_of(condition))
+        plain = given(field, condition, shift_of(condition), **FRAME)
         largest = eigenvalues_in_metric(plain, plain.chart, x)[:, -1].max()
-        assert float(largest) <= -plain.field.rate / TIME_UNIT_S + 1e-6
+        assert float(largest) <= -plain.field.rate / (FRAME["slowdown"] * TIME_UNIT_S) + 1e-6
         assert plain.field.rate >= RATE
 
 
@@ -115,21 +148,21 @@ def test_after_a_change_the_distance_to_the_new_goal_falls_at_the_proven_rate():
     first, second = (given(field, condition, shift_of(condition)) for condition in conditions(2))
     at_change = first.solve(states(50), times[:10])[:, -1]
     after = second.chart.to_latent(second.solve(at_change, times)).norm(dim=-1)
-    decay = torch.exp(-second.field.rate / TIME_UNIT_S * times)
+    decay = torch.exp(-second.field.rate * second.time_law.progress(times / TIME_UNIT_S))
     assert bool((after <= decay * after[:, :1] * (1 + 1e-9)).all())
 
 
 def test_two_robots_under_the_same_changes_approach_up_to_the_jumps_of_the_metric():
-    """κ e^{-τt} with κ the product of what each change of chart stretches distances by."""
-    field, stretch = exact("linear"), 1.0
+    """κ e^{-Σ τᵢ θᵢ} with κ the product of what each change of chart stretches distances by."""
+    field, stretch, exponent = exact("linear"), 1.0, 0.0
     plain = [given(field, condition, shift_of(condition)) for condition in conditions(4)]
     pair, duration = states(2), 0.7
     begun = latent_distance(plain[0], pair)
     for now, later in zip(plain, [*plain[1:], plain[-1]], strict=True):
         pair = now.solve(pair, torch.tensor([duration], dtype=torch.float64))[:, 0]
         stretch *= latent_distance(later, pair) / latent_distance(now, pair)
-    rate = plain[0].field.rate / TIME_UNIT_S
-    assert latent_distance(plain[-1], pair) <= stretch * math.exp(-rate * len(plain) * duration) * begun * (1 + 1e-9)
+        exponent += now.field.rate * float(now.time_law.progress(torch.tensor(duration / TIME_UNIT_S)))
+    assert latent_distance(plain[-1], pair) <= stretch * math.exp(-exponent) * begun * (1 + 1e-6)
 
 
 def latent_distance(field: ChartedField, pair: torch.Tensor) -> float:
@@ -165,9 +198,7 @@ def test_a_batch_of_conditions_is_judged_row_by_row(line_integral):
 def test_a_motion_that_is_continued_goes_on_where_it_was():
     """Half of the way and the rest of it are the whole, also where the time law is not that of a clock."""
     field, (condition,) = exact("linear"), conditions(1)
-    law = disturbed(SplineTimeLaw(knots=6, min_speed=0.2))
-    plain = given(field, condition, shift_of(condition))
-    plain = ChartedField(plain.chart, plain.field, plain.time_unit_s, law)
+    plain = given(field, condition, shift_of(condition), **FRAME)
     half, whole = torch.tensor([0.9], dtype=torch.float64), torch.tensor([0.9, 2.3], dtype=torch.float64)
     middle = plain.solve(states(3), half)[:, 0]
     assert_close(plain.later(0.9).solve(middle, whole[1:] - half)[:, 0], plain.solve(states(3), whole)[:, 1])

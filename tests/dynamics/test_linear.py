@@ -84,3 +84,15 @@ def test_each_trajectory_can_have_its_own_times():
     start, times = torch.randn(4, 3, dtype=torch.float64), torch.rand(4, 6, dtype=torch.float64)
     each = torch.stack([field.solve(one, own) for one, own in zip(start, times, strict=True)])
     torch.testing.assert_close(field.solve(start, times), each)
+
+
+def test_each_trajectory_can_have_its_own_matrix():
+    """Real, complex and double eigenvalues side by side, with finite gradients."""
+    matrices = torch.tensor([[[-1.0, 0.5], [0.5, -2]], [[-1, 3], [-3, -1]], [[-2, 0], [0, -2]]], dtype=torch.float64)
+    matrices.requires_grad_()
+    times = torch.rand(3, 6, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    found = matrix_exponentials(matrices, times)
+    torch.testing.assert_close(found, torch.linalg.matrix_exp(matrices[:, None] * times[..., None, None]))
+    (gradient,) = torch.autograd.grad(found.square().sum(), matrices)
+    series = torch.linalg.matrix_exp(matrices[:, None] * times[..., None, None]).square().sum()
+    torch.testing.assert_close(gradient, torch.autograd.grad(series, matrices)[0])

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from geomotion.dynamics.time_law import LaterTimeLaw, SplineTimeLaw
+from geomotion.dynamics.time_law import ConditionalTimeLaw, LaterTimeLaw, SplineTimeLaw
 
 
 @pytest.fixture
@@ -48,3 +48,23 @@ def test_a_later_start_continues_the_same_law(law: SplineTimeLaw) -> None:
         law.progress(torch.full_like(times, 0.4)) + later.progress(times), law.progress(times + 0.4)
     )
     torch.testing.assert_close(later.speed(times), law.speed(times + 0.4))
+
+
+def test_each_condition_has_the_law_of_its_mixed_parameters() -> None:
+    torch.manual_seed(4)
+    laws = ConditionalTimeLaw(context=3, knots=7, min_speed=0.1).double()
+    torch.nn.init.normal_(laws.raw_speeds, std=2.0)
+    conditions, times = torch.rand(5, 3, dtype=torch.float64), 2 * torch.rand(5, 4, 6, dtype=torch.float64)
+    together = laws.given(conditions)
+    for number, condition in enumerate(conditions):
+        alone = SplineTimeLaw(knots=7, min_speed=0.1).double()
+        with torch.no_grad():
+            alone.raw_speeds.copy_(condition @ laws.raw_speeds)
+        for one, speed, progress in (
+            (laws.given(condition), together.speed(times)[number], together.progress(times)[number]),
+            (alone, laws.given(condition).speed(times[number]), laws.given(condition).progress(times[number])),
+        ):
+            torch.testing.assert_close(one.speed(times[number]), speed)
+            torch.testing.assert_close(one.progress(times[number]), progress)
+        assert alone.slowest() >= laws.slowest()
+    torch.testing.assert_close(together.speed(times[:, 0, 0]), together.speed(times)[:, 0, 0])

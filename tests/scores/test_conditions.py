@@ -20,6 +20,12 @@ def test_means_are_averaged_and_largest_values_stay_the_largest():
     assert "alone" not in whole.scores
 
 
+def test_the_smallest_of_smallest_values_is_kept():
+    parts = [Evaluation({"clearance": Score(value, "mm", 4, statistic="min")}) for value in (3.0, -1.0, 2.0)]
+    whole = merged(parts).scores["clearance"]
+    assert (whole.value, whole.statistic, whole.values) == (-1.0, "min", (3.0, -1.0, 2.0))
+
+
 def test_demonstrations_and_points_of_all_conditions_are_kept():
     whole = merged([evaluation(1.0, 0.0, 2), evaluation(3.0, 0.0, 1)])
     assert [whole.arrays[f"demo_{number}"].tolist() for number in range(3)] == [[1, 0], [1, 1], [3, 0]]

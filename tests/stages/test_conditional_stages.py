@@ -51,13 +51,19 @@ def to_targets(ncds):
     return ncds("train", *TO_TARGETS, *TOY).document["stages"]["train"]["run_id"]
 
 
+@pytest.fixture(scope="module")
+def judged(ncds, letters):
+    """Among an obstacle."""
+    sphere = ["obstacle=sphere", "obstacle.centre_m=[0.02,0.05]", "obstacle.radius_m=0.01"]
+    return ncds("eval", f"run={letters}", *sphere, *TOY[3:], "evaluation.nearby_starts=2")
+
+
 def folder(result, stage) -> Path:
     return Path(result.document["stages"][stage]["folder"])
 
 
-def test_each_condition_is_judged_and_all_together(ncds, letters):
-    result = ncds("eval", f"run={letters}", *TOY[3:])
-    scores = result.document["scores"]
+def test_each_condition_is_judged_and_all_together(judged):
+    scores = judged.document["scores"]
     assert [(one["name"], one["condition"]) for one in scores["conditions"]] == [
         ("l", {"l": 1.0, "v": 0.0}),
         ("v", {"l": 0.0, "v": 1.0}),
@@ -66,15 +72,30 @@ def test_each_condition_is_judged_and_all_together(ncds, letters):
     assert scores["scores"]["train.dtwd_per_point"]["value"] == pytest.approx(np.mean(each))
     assert scores["scores"]["nearby.claimed.bound_excess"]["value"] < 1e-3
     assert scores["scores"]["contraction.claimed.non_contracting_fraction"]["value"] == 0
-    certificate = result.document["certificate"]
+    certificate = judged.document["certificate"]
     assert certificate["claim"] == "by_construction"
     assert "every condition" in certificate["reason"]
     for name in ("0_l", "1_v"):
-        with np.load(folder(result, "evaluate") / "conditions" / name / "evaluation.npz", allow_pickle=False) as arrays:
+        with np.load(folder(judged, "evaluate") / "conditions" / name / "evaluation.npz", allow_pickle=False) as arrays:
             assert {"demo_3", "rollout_3", "field_velocity"} <= set(arrays.files)
     for name in ("motion", "eigenvalues"):
-        assert (folder(result, "evaluate") / "figures" / f"{name}.png").is_file()
-    assert "held-out DTWD" in result.text
+        assert (folder(judged, "evaluate") / "figures" / f"{name}.png").is_file()
+    assert "held-out DTWD" in judged.text
+
+
+def test_obstacles_are_judged_under_each_condition(judged):
+    scores, measured = judged.document["scores"], judged.document["certificate"]["obstacles"]["measured"]
+    each = [one["scores"]["obstacles.passage.clearance"]["value"] for one in scores["conditions"]]
+    assert len(each) == 2
+    assert scores["scores"]["obstacles.passage.clearance"]["value"] == min(each) > -1e-3  # mm
+    assert measured["obstacles.passage.clearance"] == min(each)
+    assert set(measured) == {name for name in scores["scores"] if name.startswith("obstacles.")}
+
+
+def test_the_equilibrium_is_where_each_condition_s_demonstrations_end(judged):
+    for one in judged.document["scores"]["conditions"]:  # an affine x*(c) meets both ends
+        for name in ("speed_at_goal", "goal_distance", "end_distance"):
+            assert one["scores"][f"equilibrium.{name}"]["value"] < 1e-3
 
 
 def test_a_demonstration_s_rollout_has_its_own_condition(ncds, letters):
@@ -159,12 +180,13 @@ def test_the_thesis_field_is_learned_exported_and_reported_with_labels(ncds):
         "run", *LETTERS[:2], "dataset.condition=label", *LETTERS[3:], *thesis, "field.hidden_units=[8]", *TOY[2:],
     )  # fmt: skip
     policy = json.loads((folder(result, "export") / "policy.json").read_text())
-    assert policy["condition"] == {"name": "condition", "shape": ["batch", 1], "entries": ["label"]}
+    assert policy["inputs"]["condition"] == {"shape": ["batch", 1], "unit": "1"}
+    assert policy["condition"] == ["label"]
     assert policy["demonstrated"]["v"]["condition"] == [1.0]
-    assert policy["max_difference_to_torch_m_per_s"] < 1e-5
+    assert policy["max_difference_to_torch"]["velocity_m_per_s"] < 1e-5
     page = (folder(result, "report") / "report.html").read_text()
     assert "Conditions" in page
     mlflow.set_tracking_uri(f"sqlite:///{folder(result, 'export').parents[2]}/mlflow.db")
     model = mlflow.pyfunc.load_model(f"runs:/{result.document['stages']['export']['run_id']}/policy")
     asked = {"state_m": np.zeros((3, 2), np.float32), "condition": np.zeros((3, 1), np.float32)}
-    assert model.predict(asked).shape == (3, 2)
+    assert model.predict(asked)["velocity_m_per_s"].shape == (3, 2)

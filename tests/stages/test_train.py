@@ -8,6 +8,7 @@ from geomotion import models
 from geomotion.demos import readers, storage
 from geomotion.demos.preprocessing import preprocess
 from geomotion.errors import InvalidSetting
+from geomotion.files import read_json
 from geomotion.models import ModelConfig
 from geomotion.stages.train import TrainConfig, train
 from geomotion.tracking import Artefacts, StageRun
@@ -34,6 +35,21 @@ def run(tmp_path) -> StageRun:
     run = StageRun(tmp_path / "train", tmp_path / "checkpoint", client=None, run_id="1")
     run.log_series = lambda step, values: None
     return run
+
+
+def test_what_training_was_taken_back_from_is_written_down(ingested, run, monkeypatch):
+    from geomotion.training.objectives import VelocityReconstruction
+
+    whole = VelocityReconstruction.__call__
+
+    def broken_once(objective, model, progress, generator):
+        losses = whole(objective, model, progress, generator)
+        return {"velocity": losses["velocity"] * torch.inf} if progress == 0.5 else losses
+
+    monkeypatch.setattr(VelocityReconstruction, "__call__", broken_once)
+    train(TrainConfig(LETTERS, LINE_INTEGRAL, schema.VelocityTraining(steps=4), 0), ingested, run)
+    expected = {"step": 2, "loss": None, "to_step": 0, "learning_rate_factor": 0.3}
+    assert read_json(run.folder / "training.json") == {"returns": [expected]}
 
 
 def test_every_loss_is_kept_and_the_model_can_be_read(ingested, run):

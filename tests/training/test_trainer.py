@@ -69,33 +69,107 @@ def test_an_interrupted_training_ends_in_the_same_parameters(tmp_path, stopped_a
     assert history.rows == expected.rows
 
 
-def test_a_loss_that_is_not_finite_stops_the_training(tmp_path):
-    def explode(model, progress, generator):
-        return {"loss": model.weight.sum() * (math.inf if progress > 0.5 else 1.0)}
+class Breaking:
+    """A quadratic loss; at one call something goes wrong."""
 
-    with pytest.raises(TrainingDiverged, match="step 21"):
-        fit(model(), explode, schedule(), tmp_path / "checkpoint", ignore)
+    def __init__(self, at: int, signal_at: int | None = None) -> None:
+        self.at = at
+        self.whole = NoisyQuadratic(signal_at)
+
+    def __call__(self, model, progress, generator):
+        losses = self.whole(model, progress, generator)
+        return self.broken(model, losses) if self.whole.calls == self.at else losses
+
+
+class Infinite(Breaking):
+    def broken(self, model, losses):
+        return {"fit": losses["fit"] * math.inf, "bias": losses["bias"]}
+
+
+class Displaced(Breaking):
+    """Its parameters are thrown far away, where a clipped gradient does not bring them back from."""
+
+    def broken(self, model, losses):
+        with torch.no_grad():
+            model.bias += 100
+        return losses
 
 
 class Steep(torch.autograd.Function):
-    """Zero, with a slope of choice."""
+    """The value, with an infinite slope."""
 
     @staticmethod
-    def forward(ctx, value, slope):
-        ctx.slope = slope
-        return value * 0
+    def forward(ctx, value):
+        return value.clone()
 
     @staticmethod
     def backward(ctx, gradient):
-        return gradient * ctx.slope, None
+        return gradient * math.inf
 
 
-def test_parameters_that_the_last_step_ruins_stop_the_training(tmp_path):
-    def ruin(model, progress, generator):
-        return {"loss": Steep.apply(model.weight.sum() + model.bias.sum(), 1.0 if progress < 0.97 else math.inf)}
+class InfiniteSlope(Breaking):
+    def broken(self, model, losses):
+        return {"fit": Steep.apply(losses["fit"])}
 
-    with pytest.raises(TrainingDiverged, match="step 40"):
-        fit(model(), ruin, schedule(), tmp_path / "checkpoint", ignore)
+
+@pytest.mark.parametrize(("kind", "at"), [(Infinite, 20), (InfiniteSlope, 20), (InfiniteSlope, 40)])
+def test_what_is_not_finite_takes_the_training_back_and_slows_it(tmp_path, caplog, kind, at):
+    trained = model()
+    history = fit(trained, kind(at), schedule(log_every_steps=1), tmp_path / "checkpoint", ignore)
+    (back,) = history.returns
+    assert (back.step, back.to_step, back.learning_rate_factor) == (at - 1, 0, 0.3)
+    assert not math.isfinite(back.loss)
+    assert f"broke down at step {back.step}" in caplog.text
+    assert all(parameter.isfinite().all() for parameter in trained.parameters())
+    rates = {int(row["step"]): row["learning_rate"] for row in history.rows}
+    assert back.step not in rates
+    for step, rate in rates.items():
+        assert rate == pytest.approx(schedule().learning_rate_at(step) * (0.3 if step > back.step else 1.0))
+
+
+def test_a_loss_that_stays_far_above_its_median_takes_the_training_back(tmp_path):
+    trained, long = model(), schedule(steps=400)
+    history = fit(trained, Displaced(190), long, tmp_path / "checkpoint", ignore)
+    (back,) = history.returns
+    assert (back.step, back.to_step) == (239, 150)  # the loss rises after the displacement and has to stay up
+    assert history.rows[-1]["total"] < 0.01 * back.loss
+    assert trained.bias.norm() < 2
+
+
+def test_a_training_that_does_not_break_down_is_only_watched(tmp_path):
+    watched, plain, long = model(), model(), schedule(steps=120)
+    history = fit(watched, NoisyQuadratic(), long, tmp_path / "checkpoint", ignore)
+    objective, optimiser = NoisyQuadratic(), torch.optim.Adam(plain.parameters(), 0.05, fused=True)
+    for step in range(long.steps):
+        optimiser.param_groups[0]["lr"] = long.learning_rate_at(step)
+        generator = torch.Generator().manual_seed(3 * 1_000_003 + step)
+        optimiser.zero_grad()
+        torch.stack(list(objective(plain, step / long.steps, generator).values())).sum().backward()
+        nn.utils.clip_grad_norm_(plain.parameters(), 1.0)
+        optimiser.step()
+    assert history.returns == []
+    for one, other in zip(watched.parameters(), plain.parameters(), strict=True):
+        torch.testing.assert_close(one, other, rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("stopped_at", [200, 260])
+def test_a_training_interrupted_around_a_breakdown_ends_in_the_same_parameters(tmp_path, stopped_at):
+    whole, again, long = model(), model(), schedule(steps=300)
+    expected = fit(whole, Displaced(190), long, tmp_path / "whole", ignore)
+    with pytest.raises(Interrupted):
+        fit(model(), Displaced(190, stopped_at), long, tmp_path / "resumed", ignore)
+    history = fit(again, NoisyQuadratic(), long, tmp_path / "resumed", ignore)
+    assert history.returns == expected.returns
+    for one, other in zip(whole.parameters(), again.parameters(), strict=True):
+        torch.testing.assert_close(one, other, rtol=0, atol=0)
+
+
+def test_a_training_that_breaks_down_again_and_again_is_stopped(tmp_path):
+    def explode(model, progress, generator):
+        return {"loss": model.weight.sum() * (math.inf if progress > 0.5 else 1.0)}
+
+    with pytest.raises(TrainingDiverged, match="step 24"):  # three steps after the first
+        fit(model(), explode, schedule(), tmp_path / "checkpoint", ignore)
 
 
 def test_a_continued_training_says_where_it_begins(tmp_path, caplog):

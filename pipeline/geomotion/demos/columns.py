@@ -21,6 +21,8 @@ ALL_COLUMNS = (
 
 _JOINT = r"(?:\w+_)?joint(?:_?[a-z]?\d+)?"  # as URDFs call them: panda_joint1, shoulder_pan_joint, joint_a1
 
+SCALAR_LAST = "orientation_xyzw"  # an array; columns of single axes may stand in any order
+
 CONDITION = "condition"  # a column, or an array, that is constant within a demonstration
 
 _PATTERNS = (
@@ -28,7 +30,8 @@ _PATTERNS = (
     ("position_m", re.compile(r"position_(?P<unit>m|cm|mm)_(?P<axis>[xyz]|\d+)")),
     ("position_m", re.compile(r"(?P<axis>[xyz])(?:_(?P<unit>m|cm|mm))?")),
     ("velocity_m_per_s", re.compile(r"velocity_(?P<unit>m|cm|mm)_per_s_(?P<axis>[xyz]|\d+)")),
-    ("orientation_wxyz", re.compile(r"orientation_(?P<axis>[wxyz])")),
+    ("orientation_wxyz", re.compile(r"(?:orientation|quaternion|quat)_(?P<axis>[wxyz])")),
+    ("orientation_wxyz", re.compile(r"q_?(?P<axis>[wxyz])")),
     ("direction_xyz", re.compile(r"direction_(?P<axis>[xyz])")),
     ("joint_velocity_rad_per_s", re.compile(r"joint_(?P<axis>.+)_rad_per_s")),
     ("joint_velocity_rad_per_s", re.compile(rf"(?P<axis>{_JOINT})_rad_per_s")),

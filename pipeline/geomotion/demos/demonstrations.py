@@ -24,7 +24,11 @@ UNIT_NORM_TOLERANCE = {
     "orientation_wxyz": 0.5,  # the rotation is clear all the same; preprocessing mends the length and says so
     "direction_xyz": 1e-2,  # those printed with three digits still pass
 }
-VELOCITY_OF = {"position_m": "velocity_m_per_s", "joints_rad": "joint_velocity_rad_per_s"}
+VELOCITY_OF = {
+    "position_m": "velocity_m_per_s",
+    "joints_rad": "joint_velocity_rad_per_s",
+    "pose_m": "pose_velocity_m_per_s",
+}
 
 
 @dataclass(frozen=True)

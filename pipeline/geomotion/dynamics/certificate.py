@@ -7,6 +7,7 @@ from typing import Any
 
 import torch
 
+from geomotion.dynamics.embedded import EmbeddedField
 from geomotion.dynamics.fields import ChartedField
 from geomotion.dynamics.line_integral import LineIntegralField
 from geomotion.dynamics.linear import LinearField
@@ -20,9 +21,17 @@ PROOFS: Mapping[type, str] = {
     "a constant rotation: the symmetric part of its Jacobian is at most -τI everywhere, for every value of its "
     "parameters.",
 }
+WITH_DECAY = (
+    " The coordinates of the skill are {skill_dim} of {dim}; the others decay at the rate k, so the Jacobian is "
+    "block-diagonal and the field contracts in all dimensions, at the lesser of both rates."
+)
 NOT_A_JACOBIAN = (
     "The matrix field of Eq. (5.1) is negative definite, but it is in general not the Jacobian of the line integral of "
     "Eq. (5.2): its rows are not gradients. Contraction is therefore measured on the true Jacobian."
+)
+ON_MANIFOLD = (
+    " This holds on the manifold of the decoder, which is a diffeomorphism from the codes z to it. Beside the manifold "
+    "nothing is claimed: a state there moves as its projection does, and its offset does not decay."
 )
 UNCONSTRAINED = (
     "Nothing in this network keeps the symmetric part of its Jacobian negative. Whether it contracts can only be "
@@ -34,6 +43,7 @@ class Claim(Enum):
     """How much is known about contraction."""
 
     by_construction = "by_construction"  # holds for every value of the parameters
+    by_construction_on_manifold = "by_construction_on_manifold"  # the same, for states that a decoder reaches
     verified_on_set = "verified_on_set"  # bounded on a stated set
     measured_only = "measured_only"  # sampled; nothing is known between and beyond the samples
 
@@ -44,7 +54,8 @@ class Overshoot:
 
     Attributes:
         median: Median condition number of Dψ(x).
-        worst: Largest condition number of Dψ(x): how much a small distance at x can grow, at most, near x.
+        worst: Largest condition number of Dψ(x): how much a small distance at x can grow, at most, near x. Where the
+            chart is a decoder, directions are those of its manifold.
         bound: Largest over smallest singular value of Dψ anywhere on those states: trajectories that stay among them
             keep ‖x_t - y_t‖ ≤ bound · e^{-τt} ‖x_0 - y_0‖, measured along curves among them.
     """
@@ -90,24 +101,51 @@ def certify(model: ChartedField, states: States) -> Certificate:
         states: Demonstrated states [m], where the overshoot is evaluated.
     """
     overshoot = chart_distortion(model, states)
-    if isinstance(model.field, LinearField | PotentialField):
+    field, place = model.field, "" if model.is_onto else ON_MANIFOLD
+    if isinstance(field, LinearField | PotentialField | EmbeddedField):
         return Certificate(
-            Claim.by_construction,
+            Claim.by_construction if model.is_onto else Claim.by_construction_on_manifold,
             "M(x) = Dψ(x)ᵀDψ(x), the pullback of the Euclidean metric through the chart ψ",
-            model.slowest * model.field.rate / model.time_unit_s,
-            PROOFS[type(model.field)] + _about_time(model, model.field.rate),
+            slowest_rate(model) / model.time_unit_s,
+            _proof(field) + _about_time(model) + place,
             overshoot,
         )
     reason = NOT_A_JACOBIAN if isinstance(model.field, LineIntegralField) else UNCONSTRAINED
-    return Certificate(Claim.measured_only, "Euclidean metric of the chart's coordinates", None, reason, overshoot)
+    metric = "Euclidean metric of the chart's coordinates"
+    return Certificate(Claim.measured_only, metric, None, reason + place, overshoot)
 
 
-def _about_time(model: ChartedField, rate: float) -> str:
+def _proof(field: LinearField | PotentialField | EmbeddedField) -> str:
+    if isinstance(field, EmbeddedField):
+        return PROOFS[type(field.field)] + WITH_DECAY.format(skill_dim=field.skill_dim, dim=field.dim)
+    return PROOFS[type(field)]
+
+
+def slowest_rate(model: ChartedField) -> float:
+    """The rate at which a field that contracts by construction does at any time, per time unit."""
+    field = model.field
+    assert isinstance(field, LinearField | PotentialField | EmbeddedField)
+    if model.transverse_law is None or not isinstance(field, EmbeddedField):
+        return model.slowest * field.rate
+    return min(model.slowest * field.field.rate, model.transverse_law.slowest() * float(field.transverse_rate))
+
+
+def decay_over_duration(model: ChartedField) -> float:
+    """By which power of e distances fall at least over the mean duration."""
+    field, whole = model.field, torch.ones(1)
+    assert isinstance(field, LinearField | PotentialField | EmbeddedField)
+    if model.transverse_law is None or not isinstance(field, EmbeddedField):
+        return field.rate
+    return min(field.field.rate, float(field.transverse_rate * model.transverse_law.progress(whole)))
+
+
+def _about_time(model: ChartedField) -> str:
     if model.time_law is None:
         return ""
     return (
         f" Its time law multiplies velocities by a positive number, {model.slowest:.2g} at the least, which the rate "
-        f"accounts for; over the mean duration of {model.time_unit_s:.3g} s distances fall by e^-{rate:.3g}."
+        f"accounts for; over the mean duration of {model.time_unit_s:.3g} s distances fall by "
+        f"e^-{decay_over_duration(model):.3g}."
     )
 
 
@@ -118,9 +156,9 @@ def chart_distortion(model: ChartedField, states: States) -> Overshoot:
     return Overshoot(float(condition.median()), float(condition.max()), float(singular.max() / singular.min()))
 
 
-def inverse_chart_jacobian(model: ChartedField, x: States) -> Float[Tensor, "point D D"]:
-    """Dψ(x)⁻¹: the push-forward of each unit vector."""
+def inverse_chart_jacobian(model: ChartedField, x: States) -> Float[Tensor, "point D d"]:
+    """Dψ(x)⁻¹, or the decoder's Jacobian where the chart is one: the push-forward of each unit vector."""
     with torch.no_grad():
-        _, push_forward = model.chart.linearise(x)
-        columns = [push_forward(unit.expand_as(x)) for unit in torch.eye(model.dim, dtype=x.dtype)]
+        z, push_forward = model.chart.linearise(x)
+        columns = [push_forward(unit.expand_as(z)) for unit in torch.eye(z.shape[-1], dtype=x.dtype)]
     return torch.stack(columns, dim=-1)

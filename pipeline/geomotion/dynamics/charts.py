@@ -6,7 +6,7 @@ import torch
 from torch import nn
 
 from geomotion.dynamics.fields import Chart, PushForward
-from geomotion.types import Float, State, Tensor
+from geomotion.types import Float, Latent, State, Tensor
 
 
 class IdentityChart(nn.Module):
@@ -53,6 +53,30 @@ class ScalingChart(nn.Module):
         return self.to_latent(x), lambda velocity: velocity * self.scale
 
 
+class TurnedChart(nn.Module):
+    """z = Vᵀ x for an orthogonal V: the same lengths along other axes.
+
+    Args:
+        axes: V, its columns the new axes, shape (D, D).
+    """
+
+    axes: Tensor
+
+    def __init__(self, axes: Float[Tensor, "D D"]) -> None:
+        super().__init__()
+        self.dim = len(axes)
+        self.register_buffer("axes", axes)
+
+    def to_latent(self, x: State) -> State:
+        return x @ self.axes
+
+    def to_ambient(self, z: State) -> State:
+        return z @ self.axes.T
+
+    def linearise(self, x: State) -> tuple[State, PushForward]:
+        return self.to_latent(x), self.to_ambient
+
+
 class ComposedChart(nn.Module):
     """First `inner`, then `outer`: z = outer(inner(x))."""
 
@@ -62,13 +86,13 @@ class ComposedChart(nn.Module):
         self.outer = outer
         self.dim = inner.dim
 
-    def to_latent(self, x: State) -> State:
+    def to_latent(self, x: State) -> Latent:
         return self.outer.to_latent(self.inner.to_latent(x))
 
-    def to_ambient(self, z: State) -> State:
+    def to_ambient(self, z: Latent) -> State:
         return self.inner.to_ambient(self.outer.to_ambient(z))
 
-    def linearise(self, x: State) -> tuple[State, PushForward]:
+    def linearise(self, x: State) -> tuple[Latent, PushForward]:
         middle, push_inner = self.inner.linearise(x)
         z, push_outer = self.outer.linearise(middle)
         return z, lambda velocity: push_inner(push_outer(velocity))

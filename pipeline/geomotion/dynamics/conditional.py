@@ -4,6 +4,9 @@ r"""Fields that depend on a condition: a conditional system is an autonomous one
 
 So charts, fields, rollouts and training objectives serve both, and a fixed condition gives an ordinary field.
 
+Conditions enter as codes whose entries add up to one: what is linear in a code is affine in the condition, and where
+each entry belongs to one label it is that label's own.
+
 Source: Thesis Eq. (5.13), Sec. 5.5.
 """
 
@@ -12,9 +15,11 @@ from collections.abc import Callable
 import torch
 from torch import nn
 
+from geomotion.dynamics.conditional_linear import ConditionalLinear
 from geomotion.dynamics.fields import Chart, ChartedField, PushForward, SolvableField, VectorField
 from geomotion.dynamics.line_integral import LineIntegralField
 from geomotion.dynamics.regularisers import Regulariser, StateDependentRegulariser
+from geomotion.dynamics.time_law import ConditionalTimeLaw
 from geomotion.types import Float, State, Tensor, Trajectories, Velocity
 
 
@@ -114,39 +119,49 @@ def _given_regulariser(regulariser: Regulariser, condition: Float[Tensor, "*batc
 
 
 class ChartGiven(nn.Module):
-    """x ↦ ψ(x - s, c) for a fixed condition.
+    """x ↦ ψ((x - s) / r, c) for a fixed condition.
 
     Args:
         chart: ψ, a chart of (x, c) that leaves c as it is.
         condition: c, shape (K,).
         shift: s, where the origin of the chart's states is moved to [m].
+        stretch: r, by which lengths are larger than the chart's.
     """
 
     condition: Tensor
     shift: Tensor
+    stretch: Tensor
     latent_condition: Tensor
 
-    def __init__(self, chart: Chart, condition: Float[Tensor, " K"], shift: Float[Tensor, " D"]) -> None:
+    def __init__(
+        self, chart: Chart, condition: Float[Tensor, " K"], shift: Float[Tensor, " D"], stretch: float = 1.0
+    ) -> None:
         super().__init__()
         self.chart = chart
         self.dim = chart.dim - len(condition)
         self.register_buffer("condition", condition)
         self.register_buffer("shift", shift)
+        self.register_buffer("stretch", torch.as_tensor(stretch, dtype=shift.dtype))
         self.register_buffer("latent_condition", self._latent_condition(), persistent=False)
 
     def to_latent(self, x: State) -> State:
-        return self.chart.to_latent(self._beside(x - self.shift, self.condition))[..., : self.dim]
+        return self.chart.to_latent(self._own_frame(x))[..., : self.dim]
 
     def to_ambient(self, z: State) -> State:
-        return self.chart.to_ambient(self._beside(z, self.latent_condition))[..., : self.dim] + self.shift
+        own = self.chart.to_ambient(self._beside(z, self.latent_condition))[..., : self.dim]
+        return own * self.stretch + self.shift
 
     def linearise(self, x: State) -> tuple[State, PushForward]:
-        z, push_forward = self.chart.linearise(self._beside(x - self.shift, self.condition))
+        z, push_forward = self.chart.linearise(self._own_frame(x))
 
         def push(tangent: Tensor) -> Tensor:
-            return push_forward(self._beside(tangent, torch.zeros_like(self.condition)))[..., : self.dim]
+            own = push_forward(self._beside(tangent, torch.zeros_like(self.condition)))[..., : self.dim]
+            return own * self.stretch
 
         return z[..., : self.dim], push
+
+    def _own_frame(self, x: State) -> Tensor:
+        return self._beside((x - self.shift) / self.stretch, self.condition)
 
     def _beside(self, x: State, condition: Float[Tensor, " K"]) -> Tensor:
         return torch.cat([x, condition.expand(*x.shape[:-1], -1)], -1)
@@ -158,14 +173,26 @@ class ChartGiven(nn.Module):
         return self.chart.to_latent(origin)[self.dim :]
 
 
-def given(field: ChartedField, condition: Float[Tensor, " K"], shift: Float[Tensor, " D"]) -> ChartedField:
+@torch.no_grad()
+def given(
+    field: ChartedField,
+    condition: Float[Tensor, " K"],
+    shift: Float[Tensor, " D"],
+    stretch: float = 1.0,
+    slowdown: float = 1.0,
+) -> ChartedField:
     """The ordinary field that a field of (x, c) is for a fixed condition.
 
     Args:
-        field: Of states and conditions, with :class:`Standing` or :class:`ConditionalLineIntegral` in its chart.
+        field: Of states and conditions; its latent field has :class:`Standing`, :class:`ConditionalLinear` or
+            :class:`ConditionalLineIntegral`.
         condition: c, as the field takes it.
         shift: Where the origin of the field's states is moved to [m].
+        stretch: By which lengths are larger than the field's.
+        slowdown: By which times are longer than the field's.
     """
-    chart = ChartGiven(field.chart, condition, shift)
-    assert isinstance(field.field, Standing | ConditionalLineIntegral)
-    return ChartedField(chart, field.field.given(chart.latent_condition), field.time_unit_s, field.time_law)
+    chart, latent, law = ChartGiven(field.chart, condition, shift, stretch), field.field, field.time_law
+    assert isinstance(latent, Standing | ConditionalLinear | ConditionalLineIntegral)
+    if isinstance(law, ConditionalTimeLaw):
+        law = law.given(chart.latent_condition)
+    return ChartedField(chart, latent.given(chart.latent_condition), slowdown * field.time_unit_s, law)

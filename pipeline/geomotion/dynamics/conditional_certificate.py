@@ -6,24 +6,24 @@ from dataclasses import replace
 from geomotion.dynamics.certificate import Certificate, Claim, Overshoot
 
 EVERY_CONDITION = (
-    " This holds for every condition, shown or not: the condition chooses the chart and the equilibrium, not the rate. "
-    "A change of condition on the way changes the metric once; from then on distances fall at the same rate."
+    " The same holds under every condition, shown or not, in a metric of its own, at a rate that is, per duration of "
+    "its motions, at least field.min_rate_per_duration times the smallest speed of a time law. The rate given here is "
+    "that of the slowest demonstrated condition. A change of condition on the way changes the metric once; from then "
+    "on distances fall at the rate of the new one."
 )
 
 
 def for_all_conditions(certificates: Sequence[Certificate]) -> Certificate:
-    """One claim for all conditions: the slowest rate, and of each number of the overshoot the largest.
+    """One claim for all conditions: that of the slowest, with the largest of each number of the overshoot.
 
     Args:
         certificates: Of the demonstrated conditions, one or more; of one kind, as they are of one model.
     """
-    first = certificates[0]
-    rates = [certificate.rate_per_s for certificate in certificates if certificate.rate_per_s is not None]
+    slowest = min(certificates, key=lambda certificate: certificate.rate_per_s or 0.0)
     overshoots = [certificate.overshoot for certificate in certificates if certificate.overshoot is not None]
     worst = [max(values) for values in zip(*((one.median, one.worst, one.bound) for one in overshoots), strict=True)]
     return replace(
-        first,
-        rate_per_s=min(rates) if rates else None,
-        reason=first.reason + (EVERY_CONDITION if first.claim is Claim.by_construction else ""),
+        slowest,
+        reason=slowest.reason + (EVERY_CONDITION if slowest.claim is Claim.by_construction else ""),
         overshoot=Overshoot(*worst) if worst else None,
     )

@@ -6,8 +6,8 @@ from typing import Protocol, runtime_checkable
 import torch
 from torch import nn
 
-from geomotion.dynamics.time_law import LaterTimeLaw, TimeLaw
-from geomotion.types import Float, State, Tensor, Trajectories, Velocity
+from geomotion.dynamics.time_law import Clock, ConditionalTimeLaw, LaterTimeLaw, TimeLaw
+from geomotion.types import Float, Latent, State, Tensor, Trajectories, Velocity
 
 PushForward = Callable[[Tensor], Tensor]
 
@@ -33,6 +33,31 @@ class SolvableField(VectorField, Protocol):
 
 
 @runtime_checkable
+class SkillField(VectorField, Protocol):
+    """A field whose first coordinates are those of a skill; all others, z_e, lead back to where they vanish.
+
+    Attributes:
+        skill_dim: Coordinates of the skill.
+    """
+
+    skill_dim: int
+
+
+@runtime_checkable
+class SolvableSkillField(SkillField, Protocol):
+    """One whose trajectories are known in closed form."""
+
+    def solve(
+        self,
+        start: State,
+        times: Float[Tensor, "*#batch time"],
+        transverse_times: Float[Tensor, "*#batch time"] | None = None,
+    ) -> Trajectories:
+        """As of :class:`SolvableField`, with a clock of their own for z_e."""
+        ...
+
+
+@runtime_checkable
 class TimedVelocity(VectorField, Protocol):
     """A field ẋ = f(x, t)."""
 
@@ -43,19 +68,25 @@ class TimedVelocity(VectorField, Protocol):
 
 @runtime_checkable
 class Chart(Protocol):
-    """A diffeomorphism between the coordinates of the robot (x) and those where contraction is claimed (z)."""
+    """A diffeomorphism between the coordinates of the robot (x) and those where contraction is claimed (z).
+
+    An injective one has fewer coordinates z than the robot: ψ⁻¹ reaches a manifold, and ψ projects onto it.
+
+    Attributes:
+        dim: Coordinates of the robot.
+    """
 
     dim: int
 
-    def to_latent(self, x: State) -> State:
+    def to_latent(self, x: State) -> Latent:
         """z = ψ(x)."""
         ...
 
-    def to_ambient(self, z: State) -> State:
+    def to_ambient(self, z: Latent) -> State:
         """x = ψ⁻¹(z)."""
         ...
 
-    def linearise(self, x: State) -> tuple[State, PushForward]:
+    def linearise(self, x: State) -> tuple[Latent, PushForward]:
         """ψ(x) together with ż ↦ Dψ(x)⁻¹ ż, which reuses the pass that computed ψ(x)."""
         ...
 
@@ -72,58 +103,113 @@ class ChartedField(nn.Module):
         chart: ψ, from [m] to latent coordinates [-].
         field: f, in latent coordinates per time unit.
         time_unit_s: T, what one unit of the latent field's time lasts [s].
-        time_law: θ; without one, θ̇ = 1.
+        time_law: θ, which may depend on the condition that states carry; without one, θ̇ = 1.
+        transverse_law: The clock of the coordinates beyond those of the skill, where `field` is an embedded one; None:
+            θ is theirs as well.
     """
 
-    def __init__(self, chart: Chart, field: VectorField, time_unit_s: float, time_law: TimeLaw | None = None) -> None:
+    def __init__(
+        self,
+        chart: Chart,
+        field: VectorField,
+        time_unit_s: float,
+        time_law: TimeLaw | ConditionalTimeLaw | None = None,
+        transverse_law: TimeLaw | None = None,
+    ) -> None:
         super().__init__()
         self.chart = chart
         self.field = field
         self.time_unit_s = time_unit_s
         self.time_law = time_law
+        self.transverse_law = transverse_law
         self.dim = chart.dim
 
     def forward(self, x: State, elapsed_s: Float[Tensor, "*#batch 1"] | None = None) -> Velocity:
         """ẋ at a time since the start of the motion [s]; without one, at θ̇ = 1."""
         z, push_forward = self.chart.linearise(x)
-        velocity: Velocity = push_forward(self.field(z)) / self.time_unit_s
-        return velocity if elapsed_s is None else self.speed(elapsed_s / self.time_unit_s) * velocity
+        latent = self.field(z)
+        if elapsed_s is not None:
+            latent = self.paced(z, latent, elapsed_s / self.time_unit_s)
+        velocity: Velocity = push_forward(latent) / self.time_unit_s
+        return velocity
 
     def velocity(self, x: State, elapsed_s: Float[Tensor, "*#batch 1"]) -> Velocity:
         """ẋ at a time since the start of the motion [s]."""
         velocity: Velocity = self(x, elapsed_s)
         return velocity
 
-    def speed(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
-        """θ̇ at times since the start of the motion, in units of T."""
-        return torch.ones_like(times) if self.time_law is None else self.time_law.speed(times)
+    def paced(self, z: State, latent: Velocity, times: Float[Tensor, "*#batch 1"]) -> Velocity:
+        """Latent velocities, as :attr:`field` gives them, at times since the start of the motion, in units of T."""
+        speed = self.law_at(z).speed(times)
+        if self.transverse_law is None:
+            return speed * latent
+        assert isinstance(self.field, SkillField)
+        along, across = latent.tensor_split([self.field.skill_dim], dim=-1)
+        return torch.cat([speed * along, self.transverse_law.speed(times) * across], dim=-1)
 
-    def progress(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
-        """θ at times since the start of the motion, both in units of T."""
-        return times if self.time_law is None else self.time_law.progress(times)
+    def flow(
+        self,
+        z: State,
+        times: Float[Tensor, "*#batch time"],
+        law: TimeLaw,
+        begin: Float[Tensor, "*#batch"] | None = None,
+    ) -> Trajectories:
+        """Latent trajectories, only where they are known in closed form.
+
+        Args:
+            z: Where they are at `begin`.
+            times: When they are wanted, in units of T since the start of the motion.
+            law: θ, of :meth:`law_at`.
+            begin: In units of T; None: the start of the motion.
+        """
+        assert isinstance(self.field, SolvableField)
+
+        def shown(clock: TimeLaw) -> Tensor:
+            return clock.progress(times) - (0 if begin is None else clock.progress(begin)[..., None])
+
+        if self.transverse_law is None:
+            return self.field.solve(z, shown(law))
+        assert isinstance(self.field, SolvableSkillField)
+        return self.field.solve(z, shown(law), shown(self.transverse_law))
+
+    def law_at(self, z: State) -> TimeLaw:
+        """θ, in units of T; where it depends on the condition, of those that the latent states carry."""
+        if isinstance(self.time_law, ConditionalTimeLaw):
+            return self.time_law.given(z[..., -self.time_law.context :])
+        return Clock() if self.time_law is None else self.time_law
 
     @property
     def slowest(self) -> float:
         """A lower bound of θ̇."""
-        return 1.0 if self.time_law is None else self.time_law.slowest
+        return 1.0 if self.time_law is None else self.time_law.slowest()
 
     def later(self, begin_s: float) -> "ChartedField":
         """The same field for a motion that has run for some time already [s]."""
         if self.time_law is None:
             return self
-        law = LaterTimeLaw(self.time_law, begin_s / self.time_unit_s)
-        return ChartedField(self.chart, self.field, self.time_unit_s, law).train(self.training)
+        assert isinstance(self.time_law, TimeLaw)  # of one condition
+        begin = begin_s / self.time_unit_s
+        transverse = None if self.transverse_law is None else LaterTimeLaw(self.transverse_law, begin)
+        law = LaterTimeLaw(self.time_law, begin)
+        return ChartedField(self.chart, self.field, self.time_unit_s, law, transverse).train(self.training)
+
+    @property
+    def is_onto(self) -> bool:
+        """Whether ψ⁻¹ reaches every state; otherwise the latent field moves on a manifold of fewer dimensions."""
+        return self.field.dim == self.dim
 
     @property
     def is_solvable(self) -> bool:
         """Whether trajectories are known in closed form."""
-        return isinstance(self.field, SolvableField)
+        return isinstance(self.field, SolvableField) and self.is_onto
 
     def solve(self, start: State, times: Float[Tensor, "*#batch time"]) -> Trajectories:
-        """ψ⁻¹ of the latent trajectory, at times after the start [s]; only where the latent field has one."""
+        """ψ⁻¹ of the latent trajectory, at times after the start [s]; only where :attr:`is_solvable`."""
         assert isinstance(self.field, SolvableField)
-        progress = self.progress(times / self.time_unit_s)
-        return self.chart.to_ambient(self.field.solve(self.chart.to_latent(start), progress))
+        z, times = self.chart.to_latent(start), times / self.time_unit_s
+        if isinstance(self.time_law, ConditionalTimeLaw):
+            times = times.expand(*z.shape[:-1], -1)  # each start has a law of its own
+        return self.chart.to_ambient(self.flow(z, times, self.law_at(z)))
 
 
 class TimedField(nn.Module):

@@ -6,7 +6,10 @@ from typing import Protocol, runtime_checkable
 import torch
 from torch import nn
 
+from geomotion.dynamics.knots import speeds_at_knots, spline_progress, spline_speed
 from geomotion.types import Float, Tensor
+
+RAW_SPEED_ONE = math.log(math.expm1(1.0))  # softplus of it is one
 
 
 @runtime_checkable
@@ -21,10 +24,25 @@ class TimeLaw(Protocol):
         """θ at times after the start, 0 at the start."""
         ...
 
-    @property
     def slowest(self) -> float:
         """A lower bound of θ̇."""
         ...
+
+
+class Clock:
+    """θ(t) = t: the time law of a field that has none."""
+
+    def slowest(self) -> float:
+        """One."""
+        return 1.0
+
+    def speed(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
+        """One."""
+        return torch.ones_like(times)
+
+    def progress(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
+        """The time itself."""
+        return times
 
 
 class SplineTimeLaw(nn.Module):
@@ -48,40 +66,74 @@ class SplineTimeLaw(nn.Module):
         super().__init__()
         self.knots = knots
         self.min_speed = min_speed
-        self.raw_speeds = nn.Parameter(torch.full((knots + 1,), math.log(math.expm1(1.0))))  # softplus of it is one
+        self.raw_speeds = nn.Parameter(torch.full((knots + 1,), RAW_SPEED_ONE))
 
     @property
     def speeds(self) -> Float[Tensor, " knot"]:
         """θ̇ at the knots."""
-        free = nn.functional.softplus(self.raw_speeds)
-        mean = (free.sum() - (free[0] + free[-1]) / 2) / self.knots  # trapezoids, exact for piecewise linear speeds
-        return self.min_speed + (1 - self.min_speed) * free / mean
+        return speeds_at_knots(self.raw_speeds, self.min_speed)
 
-    @property
     def slowest(self) -> float:
         """The smallest θ̇, which a knot has."""
         return float(self.speeds.detach().min())
 
     def speed(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
         """θ̇ at times after the start."""
-        speeds = self.speeds
-        knot, share = self._locate(times)
-        return torch.lerp(speeds[knot], speeds[knot + 1], share)
+        return spline_speed(self.speeds, times)
 
     def progress(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
         """θ at times after the start."""
-        speeds = self.speeds
-        knot, share = self._locate(times)
-        means = (speeds[1:] + speeds[:-1]) / (2 * self.knots)
-        before = torch.cat([means.new_zeros(1), means.cumsum(0)])
-        within = share * (speeds[knot] + share * (speeds[knot + 1] - speeds[knot]) / 2) / self.knots
-        return before[knot] + within + speeds[-1] * (times - 1).clamp(min=0)
+        return spline_progress(self.speeds, times)
 
-    def _locate(self, times: Tensor) -> tuple[Tensor, Tensor]:
-        """The knot before each time, and the share of the way to the next."""
-        position = times.clamp(0, 1) * self.knots
-        knot = position.long().clamp(max=self.knots - 1)
-        return knot, position - knot
+
+class ConditionalTimeLaw(nn.Module):
+    """Time laws of conditions: the parameters of a :class:`SplineTimeLaw`, linear in the code c of the condition.
+
+    Args:
+        context: K, entries of c, which add up to one.
+        knots: Intervals between knots.
+        min_speed: Smallest θ̇, under every condition.
+    """
+
+    def __init__(self, context: int, knots: int, min_speed: float) -> None:
+        super().__init__()
+        self.context = context
+        self.min_speed = min_speed
+        self.raw_speeds = nn.Parameter(torch.full((context, knots + 1), RAW_SPEED_ONE))
+
+    def slowest(self) -> float:
+        """A lower bound of θ̇ that holds for every condition."""
+        return self.min_speed
+
+    def given(self, condition: Float[Tensor, "*group K"]) -> "GivenTimeLaw":
+        """The law of one condition, or of one for each group of times."""
+        return GivenTimeLaw(speeds_at_knots(condition @ self.raw_speeds, self.min_speed))
+
+
+class GivenTimeLaw(nn.Module):
+    """A time law from its speeds at the knots.
+
+    Args:
+        speeds: θ̇ at the knots, one law for all times or one for each group of them, which their first axes tell apart.
+    """
+
+    speeds: Tensor
+
+    def __init__(self, speeds: Float[Tensor, "*group knot"]) -> None:
+        super().__init__()
+        self.register_buffer("speeds", speeds)
+
+    def slowest(self) -> float:
+        """The smallest θ̇."""
+        return float(self.speeds.detach().min())
+
+    def speed(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
+        """θ̇ at times after the start."""
+        return spline_speed(self.speeds, times)
+
+    def progress(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
+        """θ at times after the start."""
+        return spline_progress(self.speeds, times)
 
 
 class LaterTimeLaw(nn.Module):
@@ -97,10 +149,9 @@ class LaterTimeLaw(nn.Module):
         self.law = law
         self.begin = begin
 
-    @property
     def slowest(self) -> float:
         """The bound of the whole law."""
-        return self.law.slowest
+        return self.law.slowest()
 
     def speed(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
         """θ̇ after the later start."""

@@ -8,7 +8,7 @@ Which coordinates are kept is a matter of zeros in the layers' matrices: all lay
 dimension, and nothing is gathered or concatenated, which would cost more than the arithmetic where a control loop asks
 for one state at a time.
 
-With a context c, the linear maps are affine in it, W(c) = W₀ + Σ cₖ Wₖ: each c has a flow of its own, as large as one
+With a context c, the linear maps are linear in it, too, W(c) = Σ cₖ Wₖ: each c has a flow of its own, as large as one
 without context, and nearby contexts have similar ones. Letting the Fourier features depend on c instead would make all
 contexts share the parameters of one flow.
 """
@@ -36,7 +36,7 @@ class CouplingFlow(nn.Module):
     Args:
         dim: Coordinates that are moved, at least 2.
         layers: Couplings.
-        features: Fourier features of each, per kept coordinate; cosine and sine of one angle count as two.
+        features: Fourier features of each; cosine and sine of one angle count as two.
         length_scales: Over which the features vary, in the input's units; the features are spread evenly over them.
         log_scale_cap: Largest |s| of one coupling.
         context: K, coordinates behind those that are moved.
@@ -58,9 +58,10 @@ class CouplingFlow(nn.Module):
         super().__init__()
         self.dim = dim + context
         self.context = context
+        self._terms = max(1, context)  # matrices of which each layer's are made
         self.log_scale_cap = log_scale_cap
         kept = alternating_halves(dim, layers)
-        pairs = features // 2 * (dim // 2)
+        pairs = features // 2
         frequencies = torch.zeros(layers, dim, pairs)
         for layer in range(layers):
             frequencies[layer, kept[layer]] = normal_frequencies(pairs, int(kept[layer].sum()), length_scales)
@@ -68,8 +69,8 @@ class CouplingFlow(nn.Module):
         self.register_buffer("phases", torch.tensor([0.0, -math.pi / 2]).repeat_interleave(pairs))
         self.register_buffer("moved", (~kept).to(frequencies))
         self.gain = math.sqrt(1 / pairs)  # each pair of cosine and sine has norm 1
-        self.weight = nn.Parameter(torch.zeros(layers, 2 * pairs, (1 + context) * 2 * dim))
-        self.bias = nn.Parameter(torch.zeros(layers, (1 + context) * 2 * dim))
+        self.weight = nn.Parameter(torch.zeros(layers, 2 * pairs, self._terms * 2 * dim))
+        self.bias = nn.Parameter(torch.zeros(layers, self._terms * 2 * dim))
 
     def to_latent(self, x: State) -> State:
         """ψ(x)."""
@@ -118,14 +119,14 @@ class CouplingFlow(nn.Module):
     def _layers(self) -> list[tuple[Tensor, Tensor, Tensor]]:
         """Frequencies, weight and bias of each layer, with zeros where kept coordinates would be moved."""
         log_scales = self.moved / self.log_scale_cap
-        weight_mask = torch.cat([log_scales, self.moved], -1).repeat(1, 1 + self.context)
+        weight_mask = torch.cat([log_scales, self.moved], -1).repeat(1, self._terms)
         weight = self.weight * (self.gain * weight_mask[:, None])
         bias = self.bias * (weight_mask if self.context == 0 else self._bias_mask(log_scales))
         return list(zip(self.frequencies.unbind(), weight.unbind(), bias.unbind(), strict=True))
 
     def _bias_mask(self, log_scales: Tensor) -> Tensor:
         """No shift without features, which vanish at the origin where there is context."""
-        return torch.cat([log_scales, torch.zeros_like(log_scales)], -1).repeat(1, 1 + self.context)
+        return torch.cat([log_scales, torch.zeros_like(log_scales)], -1).repeat(1, self._terms)
 
     def _condition(
         self, x: State, context: Tensor | None, frequencies: Tensor, weight: Tensor, bias: Tensor
@@ -137,7 +138,7 @@ class CouplingFlow(nn.Module):
             raw, shift = (features @ weight + bias).chunk(2, -1)
         else:
             features = features - torch.cos(self.phases)
-            raw, shift = (_weighted(features, weight, context) + _affine(bias, context)).chunk(2, -1)
+            raw, shift = (_weighted(features, weight, context) + combined(bias, context)).chunk(2, -1)
         return torch.tanh(raw), shift, angles
 
     def _scale(self, squashed: State) -> State:
@@ -146,13 +147,13 @@ class CouplingFlow(nn.Module):
 
 def _weighted(features: Tensor, weight: Tensor, context: Tensor | None) -> Tensor:
     """Features times W(c)."""
-    return features @ weight if context is None else _affine(features @ weight, context)
+    return features @ weight if context is None else combined(features @ weight, context)
 
 
-def _affine(values: Float[Tensor, "*#batch terms"], context: Float[Tensor, "*batch K"]) -> Float[Tensor, "*batch out"]:
-    """v₀ + Σ cₖ vₖ of 1 + K vectors side by side."""
-    terms: Tensor = values.unflatten(-1, (1 + context.shape[-1], -1))  # type: ignore[no-untyped-call]
-    return terms[..., 0, :] + (terms[..., 1:, :] * context[..., None]).sum(-2)
+def combined(values: Float[Tensor, "*#batch terms"], context: Float[Tensor, "*batch K"]) -> Float[Tensor, "*batch out"]:
+    """Σ cₖ vₖ of K vectors side by side."""
+    terms: Tensor = values.unflatten(-1, (context.shape[-1], -1))  # type: ignore[no-untyped-call]
+    return (terms * context[..., None]).sum(-2)
 
 
 def _join(x: Tensor, context: Tensor | None) -> Tensor:

@@ -1,12 +1,35 @@
 """States as seen from one obstacle, and velocities turned along its surface."""
 
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import torch
 
-from geomotion.obstacles.obstacle import Obstacle
 from geomotion.obstacles.solids import unit
 from geomotion.types import Float, State, Tensor, Velocity
+
+
+@runtime_checkable
+class Surface(Protocol):
+    """What contact asks of an obstacle."""
+
+    @property
+    def dim(self) -> int:
+        """D."""
+        ...
+
+    @property
+    def reference(self) -> Tensor:
+        """Where every ray leaves it once [m]."""
+        ...
+
+    def level(self, x: State) -> Float[Tensor, "*batch"]:
+        """Γ(x), see :class:`geomotion.obstacles.obstacle.Obstacle`."""
+        ...
+
+    def normal(self, x: State) -> State:
+        """∇Γ/‖∇Γ‖."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -26,7 +49,7 @@ class Contact:
     lift: State
 
     @classmethod
-    def at(cls, obstacle: Obstacle, x: State, reactivity: float) -> "Contact":
+    def at(cls, obstacle: Surface, x: State, reactivity: float) -> "Contact":
         """At the reference point, which has no direction, r and n are the first axis."""
         offset = x - obstacle.reference
         is_undefined = (offset == 0).all(dim=-1, keepdim=True)

@@ -15,7 +15,7 @@ from torch import nn
 
 from geomotion.dynamics.fields import TimedVelocity, VectorField
 from geomotion.errors import InvalidSetting, ShapeMismatch
-from geomotion.obstacles.contact import Contact
+from geomotion.obstacles.contact import Contact, Surface
 from geomotion.obstacles.obstacle import Obstacle
 from geomotion.obstacles.solids import length, unit
 from geomotion.obstacles.ways import Way, choose_way, escape, own_way
@@ -101,6 +101,10 @@ class ModulatedField(nn.Module):
     def velocity(self, x: State, time: Float[Tensor, "*batch 1"]) -> Velocity:
         """ẋ at states and times since the obstacles were where their reference points say [s]."""
         wanted = self.field.velocity(x, time) if isinstance(self.field, TimedVelocity) else self.field(x)
+        return self.modulate(x, wanted, time)
+
+    def modulate(self, x: State, wanted: Velocity, time: Float[Tensor, "*batch 1"]) -> Velocity:
+        """What obstacles make of velocities at states and times [s]."""
         shifted = [x - obstacle.velocity * time for obstacle in self.obstacles]
         pairs = list(zip(self.obstacles, shifted, strict=True))
         velocities = [
@@ -125,13 +129,40 @@ class ModulatedField(nn.Module):
         return choose_way(self.field, obstacle, partial(self._flow, obstacle))
 
     def _flow(self, obstacle: Obstacle, x: State, relative: Velocity, way: Way | None) -> Velocity:
-        contact = Contact.at(obstacle, x, self.reactivity)
-        velocity = contact.modulate(relative, self.hold)
-        if way is not None:
-            velocity = velocity + contact.modulate(escape(contact, relative, velocity, way(contact, relative)))
-        depth = (1 - contact.level).clamp(min=0) * obstacle.inradius
-        crossing = contact.crossing(relative).abs() * (depth / (RECOVERED * obstacle.inradius)).clamp(max=1)
-        return velocity + (crossing + depth / self.recovery_time_s) * contact.lift
+        return flow_around(
+            obstacle, obstacle.inradius, x, relative, way, self.reactivity, self.recovery_time_s, self.hold
+        )
+
+
+def flow_around(
+    obstacle: Surface,
+    inradius: float | Tensor,
+    x: State,
+    relative: Velocity,
+    way: Way | None,
+    reactivity: float,
+    recovery_time_s: float,
+    hold: bool = False,
+) -> Velocity:
+    """Velocities that one obstacle alone makes of others, all relative to its own; see :class:`ModulatedField`.
+
+    Args:
+        obstacle: As it stands where `x` is told.
+        inradius: Radius of a ball around its reference point that it contains [m].
+        x: States.
+        relative: f less the obstacle's velocity.
+        way: Along which to escape; None: no tangential field.
+        reactivity: ρ.
+        recovery_time_s: How long a state inside takes to cross `inradius` [s].
+        hold: Whether obstacles also slow what moves away from them.
+    """
+    contact = Contact.at(obstacle, x, reactivity)
+    velocity = contact.modulate(relative, hold)
+    if way is not None:
+        velocity = velocity + contact.modulate(escape(contact, relative, velocity, way(contact, relative)))
+    depth = (1 - contact.level).clamp(min=0) * inradius
+    crossing = contact.crossing(relative).abs() * (depth / (RECOVERED * inradius)).clamp(max=1)
+    return velocity + (crossing + depth / recovery_time_s) * contact.lift
 
 
 def _weights(levels: Float[Tensor, "obstacle *batch"]) -> Float[Tensor, "obstacle *batch"]:

@@ -69,7 +69,7 @@ def closed_loop(
             returns what is no pose, or a pose for an arm that is no Panda.
         UnknownName: If a moving obstacle is not in the scene.
     """
-    steps = _steps_per_period(control_hz)
+    steps = steps_per_period(control_hz, "robot.control_hz")
     if not duration_s * control_hz >= 1:
         raise InvalidSetting("robot.duration_s", duration_s, f"{1 / control_hz:.3g} s, one period, or more")
     recorder, asked, unreachable = Recorder(scene, motions, film), [], []
@@ -118,17 +118,20 @@ def approach_velocity(
     )
     way = target_rad - period_s * target_velocity - joints_rad
     change = limits.acceleration_rad_per_s2 * period_s  # the largest in one period
-    # from v, periods at v, v - change, v - 2 change, … cover at most v²/2a + v period/2 + a period²/8
-    room = np.maximum(np.abs(way) - change * period_s / 8, 0)
-    braking = np.sqrt(change**2 / 4 + 2 * limits.acceleration_rad_per_s2 * room) - change / 2
+    braking = limits.stopping_speed(np.abs(way), period_s)
     catching_up = np.sign(way) * np.minimum(np.maximum(braking, change), np.abs(way) / period_s)
     wanted = np.clip(target_velocity + catching_up, -limits.velocity_rad_per_s, limits.velocity_rad_per_s)
     velocity: Joints = np.clip(wanted, velocity_rad_per_s - change, velocity_rad_per_s + change)
     return velocity
 
 
-def _steps_per_period(control_hz: float) -> int:
+def steps_per_period(control_hz: float, key: str) -> int:
+    """How many steps of the simulation a control period has.
+
+    Raises:
+        InvalidSetting: If that is not a whole number, naming the setting.
+    """
     steps = RATE_HZ / control_hz if control_hz > 0 else 0.0
     if steps < 1 or steps != round(steps):
-        raise InvalidSetting("robot.control_hz", control_hz, f"a rate that divides {RATE_HZ:g} Hz")
+        raise InvalidSetting(key, control_hz, f"a rate that divides {RATE_HZ:g} Hz")
     return round(steps)

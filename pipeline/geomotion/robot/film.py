@@ -18,9 +18,12 @@ from geomotion.types import Float
 Frame = UInt8[np.ndarray, "height width 3"]
 
 PATH_COLOUR = (0.0, 0.45, 0.70, 1.0)  # blue, as geodesics are in all figures
+FORCE_COLOUR = (0.84, 0.10, 0.10, 1.0)
+FORCE_M, FORCE_DOTS, FORCE_STAYS_S = 0.2, 12, 0.8
 DOT_RADIUS_M = 0.005
 LONGEST_PATH = 200  # dots
 COLOURS = 64
+SWATCH_ROWS = 8
 FROM_THE_SIDE, FROM_ABOVE = (1.25, -1.0, 0.55), (0.4, -0.6, 1.0)
 ROOM = 1.15  # of the picture, around the ball that holds what is seen
 LEVEL = 0.2  # height, in radii of that ball, below which a motion is level
@@ -100,6 +103,29 @@ class Film:
         save_gif(self.frames, path, self.fps)
 
 
+@dataclass
+class ForceArrow:
+    """A row of dots that ends where a force acts, and stays for a while after it: pushes are short.
+
+    Attributes:
+        scene: Where it is seen.
+    """
+
+    scene: ArmScene
+    _drawn: int | None = None
+    _until_s: float = 0.0
+
+    def show(self, time_s: float, tip_m: Float[np.ndarray, "3"], force_n: Float[np.ndarray, "3"]) -> None:
+        """What is to be seen at a time [s], with a force [N] on the tip [m]."""
+        size_n = float(np.linalg.norm(force_n))
+        if self._drawn is not None and (size_n > 0 or time_s > self._until_s):
+            self.scene.erase(self._drawn)
+            self._drawn = None
+        if size_n > 0:
+            points = tip_m - FORCE_M * np.linspace(0, 1, FORCE_DOTS)[:, None] * force_n / size_n
+            self._drawn, self._until_s = self.scene.draw(points, 2 * DOT_RADIUS_M, FORCE_COLOUR), time_s + FORCE_STAYS_S
+
+
 def draw_path(scene: ArmScene, positions_m: Float[np.ndarray, "pose 3"]) -> None:
     """Show a path as dots, which nothing collides with, in pictures taken from now on."""
     scene.draw(_thinned(positions_m), DOT_RADIUS_M, PATH_COLOUR)
@@ -115,7 +141,8 @@ def save_gif(frames: Sequence[Frame], path: Path, fps: float) -> None:
 
     if not frames or not fps > 0:
         raise InvalidSetting("film", f"{len(frames)} frames at {fps} frames/s", "one frame or more at a positive rate")
-    shown = np.concatenate([frames[i] for i in {0, len(frames) // 2, len(frames) - 1}])
+    seldom = np.full_like(frames[0][:1], 255 * np.array(FORCE_COLOUR[:3]))  # else it may be in none of the others
+    shown = np.concatenate([*(frames[i] for i in {0, len(frames) // 2, len(frames) - 1}), *[seldom] * SWATCH_ROWS])
     palette = Image.fromarray(shown).quantize(COLOURS)
     images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     with atomic(path) as temporary:

@@ -65,6 +65,16 @@ class JointLimits:
             share * self.jerk_rad_per_s3,
         )
 
+    def stopping_speed(self, room_rad: Float[np.ndarray, " joint"], period_s: float) -> Float[np.ndarray, " joint"]:
+        """Speeds of one period, from which a joint can stop within a room that begins with that period [rad/s]."""
+        change = self.acceleration_rad_per_s2 * period_s  # the largest in one period
+        # from v, periods at v, v - change, v - 2 change, … cover at most v²/2a + v period/2 + a period²/8
+        room = np.maximum(room_rad - change * period_s / 8, 0)
+        speed: Float[np.ndarray, " joint"] = (
+            np.sqrt(change**2 / 4 + 2 * self.acceleration_rad_per_s2 * room) - change / 2
+        )
+        return speed
+
     def margin_rad(self, joints_rad: Float[np.ndarray, "*batch joint"]) -> Float[np.ndarray, "*batch"]:
         """Distance of the joint closest to one of its position limits [rad], negative beyond it."""
         smallest: Float[np.ndarray, "*batch"] = np.minimum(

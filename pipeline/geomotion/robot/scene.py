@@ -138,10 +138,14 @@ class ArmScene:
         simulated.rest({name: min(tool.radius_m, self.arm.resting[name]) for name in self.gripper.finger_joints})
         self.set_joints(self.joints()[0])
 
-    def draw(self, points_m: Float[np.ndarray, "point 3"], radius_m: float, colour: tuple[float, ...]) -> None:
-        """Show points in pictures [m]; nothing collides with them."""
+    def draw(self, points_m: Float[np.ndarray, "point 3"], radius_m: float, colour: tuple[float, ...]) -> int:
+        """Show points in pictures [m], which nothing collides with; what to :meth:`erase` them by."""
         visual = self.client.createVisualShape(**dots(points_m, radius_m), rgbaColor=colour)
-        self.client.createMultiBody(0, baseVisualShapeIndex=visual)
+        return int(self.client.createMultiBody(0, baseVisualShapeIndex=visual))
+
+    def erase(self, drawn: int) -> None:
+        """Show points no longer."""
+        self.client.removeBody(drawn)
 
     def clearances(self, max_distance_m: float = 0.2) -> dict[str, float]:
         """Distance of every moving link, and of the grasped object, to the nearest obstacle [m].

@@ -79,6 +79,31 @@ class SimulatedArm:
             forces=[self._effort[index] for index in self._moved],
         )
 
+    def drive(self, velocity_rad_per_s: Joints) -> None:
+        """Set the velocities that the motors keep in the next step, whatever their positions [rad/s]."""
+        self.client.setJointMotorControlArray(
+            self.body,
+            self._moved,
+            self.client.VELOCITY_CONTROL,
+            targetVelocities=velocity_rad_per_s.tolist(),
+            forces=self.effort.tolist(),
+        )
+
+    @property
+    def effort(self) -> Joints:
+        """The most that each motor can give [N m]."""
+        return np.array([self._effort[index] for index in self._moved])
+
+    def torques(self) -> Joints:
+        """What the motors gave in the last step [N m]."""
+        return np.array([state[3] for state in self.client.getJointStates(self.body, self._moved)])
+
+    def push(self, force_n: Float[np.ndarray, "3"]) -> None:
+        """Let a force act on the tip in the next step, in the base frame [N]."""
+        position, _ = self.link_pose(self.arm.tip_link)
+        link = self.link_index[self.arm.tip_link]
+        self.client.applyExternalForce(self.body, link, force_n.tolist(), position, self.client.WORLD_FRAME)
+
     def rest(self, positions: dict[str, float]) -> None:
         """Hold joints that are not the arm's somewhere from now on [m or rad]."""
         self._resting |= positions

@@ -1,5 +1,6 @@
 """A field as functions of arrays, which is how scores see it."""
 
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -7,10 +8,12 @@ import torch
 from jaxtyping import Float
 
 from geomotion.dynamics.fields import ChartedField
+from geomotion.dynamics.injective import rollout_on_manifold
 from geomotion.dynamics.rollout import rollout
 from geomotion.types import Tensor
 
 Points = Float[np.ndarray, "point D"]
+EXACT_TOLERANCES = {"relative_tolerance": 1e-9, "absolute_tolerance": 1e-11}
 
 
 class ArrayField:
@@ -18,11 +21,13 @@ class ArrayField:
 
     Args:
         field: The field.
+        begins_on_manifold: Whether starts of a decoded field are projected first; a motion on its way never is.
         rollout_options: Keywords of :func:`geomotion.dynamics.rollout.rollout` that choose the solver.
     """
 
-    def __init__(self, field: ChartedField, **rollout_options: Any) -> None:
+    def __init__(self, field: ChartedField, begins_on_manifold: bool = True, **rollout_options: Any) -> None:
         self.field = field
+        self.begins_on_manifold = begins_on_manifold
         self.dtype = next(field.parameters()).dtype
         self._rollout_options = rollout_options
 
@@ -30,7 +35,21 @@ class ArrayField:
         self, starts: Float[np.ndarray, "start D"], times_s: Float[np.ndarray, " time"]
     ) -> Float[np.ndarray, "start time D"]:
         """Trajectories [m] at times after the start [s]."""
-        return _array(rollout(self.field, self.tensor(starts), self.tensor(times_s), **self._rollout_options).states)
+        follow = rollout_on_manifold if self.begins_on_manifold and not self.field.is_onto else rollout
+        return _array(follow(self.field, self.tensor(starts), self.tensor(times_s), **self._rollout_options).states)
+
+    def later(self, begin_s: float) -> "ArrayField":
+        """The same field for a motion that has run for some time already [s]."""
+        return ArrayField(self.field.later(begin_s), begins_on_manifold=False, **self._rollout_options)
+
+    def exact(self) -> "ArrayField":
+        """The same field in double precision, followed in closed form or by steps that adapt to it.
+
+        For what is proven of solutions: a fixed step that is coarse for a steep field is wrong by any amount.
+        """
+        method = "closed_form" if self.field.is_solvable else "dopri5"
+        exact = deepcopy(self.field).double()
+        return ArrayField(exact, self.begins_on_manifold, method=method, **EXACT_TOLERANCES)
 
     @torch.no_grad()
     def velocity(self, states: Points, elapsed_s: Float[np.ndarray, " point"] | None = None) -> Points:
@@ -40,7 +59,7 @@ class ArrayField:
         return _array(self.field.velocity(self.tensor(states), self.tensor(elapsed_s)[:, None]))
 
     @torch.no_grad()
-    def to_claimed(self, states: Points) -> Points:
+    def to_claimed(self, states: Points) -> Float[np.ndarray, "point d"]:
         """ψ at each state: the coordinates in which contraction is claimed."""
         return _array(self.field.chart.to_latent(self.tensor(states)))
 

@@ -14,6 +14,9 @@ from geomotion.scores.jacobians import Eigenvalues, eigenvalues_in_metric, field
 from geomotion.scores.score import Score, max_score, mean_score, share_score
 from geomotion.types import States
 
+LARGEST, SMALLEST = "eigenvalue", "smallest_eigenvalue"
+ARRAYS = tuple(f"{name}_{which}" for name in ("true", "claimed", "jhat") for which in (LARGEST, SMALLEST))
+
 
 def judge_contraction(field: ChartedField, points: States, note: str) -> Evaluation:
     """Contraction in robot coordinates, in those where it is claimed, and of the matrix Ĵ where the field has one.
@@ -49,8 +52,8 @@ def judge_contraction(field: ChartedField, points: States, note: str) -> Evaluat
         for name, eigenvalues in spectra.items()
         for quantity, score in contraction_scores(eigenvalues, notes[name]).items()
     }
-    arrays = {f"{name}_eigenvalue": eigenvalues[:, -1] for name, eigenvalues in spectra.items()}
-    arrays |= {f"{name}_smallest_eigenvalue": eigenvalues[:, 0] for name, eigenvalues in spectra.items()}
+    arrays = {f"{name}_{LARGEST}": eigenvalues[:, -1] for name, eigenvalues in spectra.items()}
+    arrays |= {f"{name}_{SMALLEST}": eigenvalues[:, 0] for name, eigenvalues in spectra.items()}
     return Evaluation(scores, {"jhat_eigenvalue": np.empty(0)} | arrays, omitted)
 
 

@@ -35,7 +35,7 @@ def judge_nearby(
     """Distances in the Euclidean metric and in the one in which contraction is claimed.
 
     Args:
-        roll: The judged field's trajectories.
+        roll: The judged field's trajectories, precise: what a solver gets wrong counts against the bound.
         to_claimed: ψ: in its coordinates the claimed metric is Euclidean.
         starts: Nearby starts [m].
         times_s: Times after the start [s].
@@ -81,7 +81,7 @@ def nearby_distances(
 ) -> tuple[Distances, Distances]:
     """Distances between all rollouts at all times, Euclidean ones [m] and those of the claimed metric."""
     trajectories = roll(starts, times_s)
-    latent = to_claimed(trajectories.reshape(-1, starts.shape[1])).reshape(trajectories.shape)
+    latent = to_claimed(trajectories.reshape(-1, starts.shape[1])).reshape(*trajectories.shape[:-1], -1)
     return pairwise_distances(trajectories), pairwise_distances(latent)
 
 

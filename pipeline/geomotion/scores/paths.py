@@ -198,6 +198,15 @@ def dtwd_ratio(path: PosePath, demonstration: PosePath, others: Sequence[PosePat
     )
 
 
+def mean_path(demonstrations: Sequence[PosePath], count: int = 200) -> PosePath:
+    """Mean pose of demonstrations at equal shares of their durations."""
+    aligned = [demo.resampled(count) for demo in demonstrations]
+    return PosePath(
+        np.mean([demo.position_m for demo in aligned], axis=0),
+        _mean_orientation([demo.orientation for demo in aligned]),
+    )
+
+
 def mean_path_with_blended_ends(
     demonstrations: Sequence[PosePath], start: PosePath, goal: PosePath, count: int = 200
 ) -> PosePath:
@@ -213,9 +222,8 @@ def mean_path_with_blended_ends(
         goal: Its last pose is where the path ends.
         count: Poses of the path.
     """
-    aligned = [demo.resampled(count) for demo in demonstrations]
-    position = np.mean([demo.position_m for demo in aligned], axis=0)
-    orientation = _mean_orientation([demo.orientation for demo in aligned])
+    mean = mean_path(demonstrations, count)
+    position, orientation = mean.position_m, mean.orientation
     share = np.linspace(0, 1, count)[:, None]
     at_start, at_goal = start.position_m[0] - position[0], goal.position_m[-1] - position[-1]
     blend = _turned if orientation.shape[1] == QUATERNION else _bent

@@ -1,8 +1,9 @@
 """How well rollouts from the demonstrations' own starts reproduce them, beside what repetitions of people reach."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 from jaxtyping import Float
@@ -33,6 +34,7 @@ class Judged:
     is_trained: bool
 
 
+ARRAYS = ("demo", "rollout", "time", "set")  # of each demonstration, with its number behind the name
 CURVE_SCORES = {
     "dtwd_per_point": "Sec. 6.4, each direction divided by its number of points",
     "dtwd_sum": "Sec. 6.4, summed over the points of both curves",
@@ -179,13 +181,23 @@ def _pooled(
     return summary_score(error(predicted, recorded), [error(*pair) for pair in pairs], unit, "pooled", note)
 
 
+def merged_arrays(evaluations: Iterable[Evaluation]) -> dict[str, np.ndarray]:
+    """Arrays of the demonstrations of several evaluations, numbered through."""
+    return _numbered(own for evaluation in evaluations for own in _of_demonstrations(evaluation.arrays))
+
+
 def _arrays(judged: Sequence[Judged]) -> dict[str, np.ndarray]:
-    arrays: dict[str, np.ndarray] = {}
-    for number, one in enumerate(judged):
-        arrays |= {
-            f"demo_{number}": one.states,
-            f"rollout_{number}": one.rollout,
-            f"time_{number}": one.time_s,
-            f"set_{number}": np.array("train" if one.is_trained else "test"),
-        }
-    return arrays
+    sets = (np.array("train" if one.is_trained else "test") for one in judged)
+    parts = ((one.states, one.rollout, one.time_s, own) for one, own in zip(judged, sets, strict=True))
+    return _numbered(dict(zip(ARRAYS, own, strict=True)) for own in parts)
+
+
+def _numbered(parts: Iterable[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    return {f"{name}_{number}": array for number, own in enumerate(parts) for name, array in own.items()}
+
+
+def _of_demonstrations(arrays: Mapping[str, np.ndarray]) -> Iterator[dict[str, np.ndarray]]:
+    for number in count():
+        if f"{ARRAYS[0]}_{number}" not in arrays:
+            return
+        yield {name: arrays[f"{name}_{number}"] for name in ARRAYS}

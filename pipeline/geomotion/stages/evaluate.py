@@ -4,18 +4,32 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import field as default
+from functools import partial
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from geomotion import models
-from geomotion.config import EvaluationConfig, NoObstacle, ObstacleConfig, Protocol, SolverConfig
+from geomotion.config import (
+    EvaluationConfig,
+    NoObstacle,
+    NoSafety,
+    ObstacleConfig,
+    Protocol,
+    RiemannianSafety,
+    SafetyConfig,
+    SolverConfig,
+)
 from geomotion.demos import storage
 from geomotion.demos.demonstrations import Demonstrations, Trajectory
+from geomotion.demos.pose_vectors import POSE_CHANNEL, with_pose_vectors
 from geomotion.errors import InvalidSetting
 from geomotion.figures.evaluation import save_all
+from geomotion.figures.safety import save_safety_figures
 from geomotion.files import atomic, read_json, write_json
+from geomotion.lie.poses import POSE_DIM, PoseCoordinates
 from geomotion.models import Skill
 from geomotion.scores.array_field import ArrayField
 from geomotion.scores.contraction import judge_condition, judge_contraction
@@ -23,10 +37,18 @@ from geomotion.scores.evaluation import Evaluation, Unit, combine
 from geomotion.scores.goal import judge_goal
 from geomotion.scores.grids import Box, bounding_box, sample_box
 from geomotion.scores.nearby import judge_nearby, nearby_starts
+from geomotion.scores.off_manifold import Separation, judge_off_manifold
+from geomotion.scores.paths import PosePath
+from geomotion.scores.poses import JudgedPoses, judge_poses
+from geomotion.scores.pushes import PushProtocol, judge_pushes
 from geomotion.scores.reproduction import Judged, judge_reproduction
 from geomotion.scores.support import RegionProtocol, judge_region
 from geomotion.scores.table import scores_table
 from geomotion.stages.evaluate_obstacles import certificate_part, judge_among_obstacles
+from geomotion.stages.safety import certificate_part as safety_part
+from geomotion.stages.safety import judge_safety, safe
+from geomotion.stages.safety_picture import safety_picture
+from geomotion.stages.step_times import judge_step_times
 from geomotion.stages.verification import prove
 from geomotion.tracking import Artefacts, StageRun
 
@@ -35,6 +57,8 @@ __all__ = ["EvaluateConfig", "compute", "evaluate", "scores_table"]
 PEERS_TRIM_POINTS = 15
 PEERS_TRAIN_DEMOS = (0, 1, 2, 3, 4)
 PICTURE_POINTS_PER_AXIS = 40  # of the velocity field
+DRAWN_STARTS = 40  # of motions in a safety region
+PUSHABLE: Mapping[tuple[str, ...], int] = {(POSE_CHANNEL,): POSE_DIM, ("position_m",): 3}  # states of a body in space
 
 
 @dataclass(frozen=True)
@@ -45,11 +69,13 @@ class EvaluateConfig:
         evaluation: Protocol and grids.
         solver: How rollouts are computed.
         obstacle: Among what the field is judged as well.
+        safety: In which region, obstacles in it.
     """
 
     evaluation: EvaluationConfig
     solver: SolverConfig
     obstacle: ObstacleConfig = default(default_factory=NoObstacle)
+    safety: SafetyConfig = default(default_factory=NoSafety)
 
 
 def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
@@ -59,7 +85,7 @@ def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: Stage
         InvalidSetting: If the peers' protocol is asked for on other data than theirs.
     """
     skill = models.load(inputs["train"].path("model.pt"))
-    demonstrations = storage.load(inputs["ingest"].folder)
+    demonstrations = with_pose_vectors(storage.load(inputs["ingest"].folder), skill.pose)
     if config.evaluation.protocol is Protocol.peers:
         require_peers_data(skill.train_demos, demonstrations.steps)
     certificate = read_json(inputs["train"].path("certificate.json"))
@@ -67,8 +93,15 @@ def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: Stage
     evaluation = compute(skill, demonstrations, certificate["rate_per_s"], config.evaluation, config.solver)
     known = np.concatenate([demonstrations[number].state(skill.state_channels) for number in skill.train_demos])
     proof, certificate = prove(certificate, skill.field, known, config.evaluation)
-    among = judge_among_obstacles(skill, demonstrations, config.obstacle, config.evaluation, config.solver)
-    evaluation = combine([evaluation, proof, among])
+    region = safe(config.safety, config.obstacle, skill, demonstrations)
+    obstacle = config.obstacle if region is None else NoObstacle()
+    among = judge_among_obstacles(skill, demonstrations, obstacle, config.evaluation, config.solver)
+    in_region = Evaluation()
+    if region is not None and isinstance(config.safety, RiemannianSafety):
+        in_region, starts = judge_safety(region, demonstrations, config.evaluation, config.safety.starts)
+        save_safety_figures(safety_picture(region, starts[:DRAWN_STARTS]), run.folder / "figures")
+        certificate["safety"] = safety_part(in_region)
+    evaluation = combine([evaluation, proof, among, in_region])
 
     write_json(run.folder / "scores.json", evaluation.document(config.evaluation.protocol.value, demonstrations.name))
     with atomic(run.folder / "evaluation.npz") as temporary:
@@ -131,11 +164,15 @@ def compute(
     return combine(
         [
             judge_reproduction([*trained, *heldout], state_unit(skill.state_channels)),
+            _poses(skill.pose, [*trained, *heldout]),
+            judge_off_manifold(skill.field, [*trained, *heldout], _separation(skill)),
             _contraction(field, scene, settings, proven_rate),
             _region(field, scene, settings),
             _nearby(field, scene, settings, proven_rate),
             _goal(field, scene, settings, skill.goal.double().numpy()),
+            _pushes(field, skill, heldout or trained, settings, proven_rate),
             _picture(field, scene),
+            judge_step_times(skill, demonstrations.select(skill.train_demos), settings.timed_steps),
         ]
     )
 
@@ -148,7 +185,7 @@ def audit(evaluation: Evaluation) -> dict[str, Any]:
 
 def state_unit(channels: Sequence[str]) -> Unit:
     """Millimetres for positions, radians for joints; mixtures have no common unit."""
-    units = {"position_m": Unit("mm", 1000.0), "joints_rad": Unit("rad")}
+    units = {"position_m": Unit("mm", 1000.0), POSE_CHANNEL: Unit("mm", 1000.0), "joints_rad": Unit("rad")}
     kinds = {units.get(channel, Unit("state unit")) for channel in channels}
     return kinds.pop() if len(kinds) == 1 else Unit("state unit")
 
@@ -199,12 +236,39 @@ def _judged(field: ArrayField, demonstration: Trajectory, skill: Skill, is_train
     return Judged(time_s, states, velocities, field.roll(states[:1], time_s)[0], predicted, is_trained)
 
 
+def _poses(coordinates: PoseCoordinates | None, judged: Sequence[Judged]) -> Evaluation:
+    if coordinates is None:
+        return Evaluation()
+    path = partial(_path, coordinates)
+    return judge_poses([JudgedPoses(path(one.states), path(one.rollout), one.is_trained) for one in judged])
+
+
+def _path(coordinates: PoseCoordinates, vectors: NDArray[np.float64]) -> PosePath:
+    position, orientation = coordinates.to_pose(torch.as_tensor(vectors))
+    return PosePath(position.numpy(), orientation.numpy())
+
+
+def _separation(skill: Skill) -> Separation:
+    """Positions and orientations apart where states are poses."""
+    coordinates, unit = skill.pose, state_unit(skill.state_channels)
+
+    def separation(
+        states: NDArray[np.float64], others: NDArray[np.float64]
+    ) -> dict[str, tuple[str, NDArray[np.float64]]]:
+        if coordinates is None:
+            return {"distance": (unit.name, unit.per_state_unit * np.linalg.norm(states - others, axis=1))}
+        apart_m, apart_rad = _path(coordinates, states).residuals(_path(coordinates, others))
+        return {"position_distance": ("mm", 1000 * apart_m), "orientation_distance": ("deg", np.degrees(apart_rad))}
+
+    return separation
+
+
 def _contraction(field: ArrayField, scene: Scene, settings: EvaluationConfig, proven_rate: float | None) -> Evaluation:
     grid = sample_box(scene.box, settings.contraction_grid_points, settings.seed)
     points = field.tensor(grid.points)
     place = {"grid_points": grid.points, "grid_shape": np.array(grid.shape, dtype=int)}
     parts = [Evaluation(arrays=place), judge_contraction(field.field, points, grid.note)]
-    if proven_rate is not None:
+    if proven_rate is not None and field.field.is_onto:  # elsewhere nothing is proven of arbitrary states
         parts.append(judge_condition(field.field, points, proven_rate, grid.note))
     return combine(parts)
 
@@ -222,13 +286,26 @@ def _region(field: ArrayField, scene: Scene, settings: EvaluationConfig) -> Eval
 def _nearby(field: ArrayField, scene: Scene, settings: EvaluationConfig, proven_rate: float | None) -> Evaluation:
     deviation = settings.nearby_spread * scene.tight.diagonal
     starts = nearby_starts(scene.start, settings.nearby_starts, deviation, settings.seed)
-    return judge_nearby(field.roll, field.to_claimed, starts, scene.time_s, proven_rate)
+    exact = field.exact()  # or the bound would be held against the solver's errors
+    return judge_nearby(exact.roll, exact.to_claimed, starts, scene.time_s, proven_rate)
 
 
 def _goal(field: ArrayField, scene: Scene, settings: EvaluationConfig, goal: NDArray[np.float64]) -> Evaluation:
     starts = sample_box(scene.box, _starts_per_axis(settings), settings.seed)
     times_s = np.linspace(0.0, settings.goal_duration * scene.duration_s, settings.region_steps)
     return judge_goal(field.roll, goal, starts, times_s, settings.goal_tolerance * scene.tight.diagonal)
+
+
+def _pushes(
+    field: ArrayField, skill: Skill, judged: Sequence[Judged], settings: EvaluationConfig, proven_rate: float | None
+) -> Evaluation:
+    """Only of states that begin with a position in space."""
+    if PUSHABLE.get(skill.state_channels) != field.field.dim:
+        return Evaluation()
+    pushes, duration_s = settings.pushes, skill.geometry.duration_s
+    protocol = PushProtocol(pushes.count, pushes.size_m, pushes.at, duration_s, settings.seed)
+    rate = proven_rate if field.field.is_onto else None  # pushes leave the manifold, beside which nothing is proven
+    return judge_pushes(field, np.stack([one.states[0] for one in judged]), protocol, rate)
 
 
 def _picture(field: ArrayField, scene: Scene) -> Evaluation:

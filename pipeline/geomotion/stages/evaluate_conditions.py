@@ -21,20 +21,24 @@ from geomotion.figures.style import save_figure
 from geomotion.files import atomic, read_json, write_json
 from geomotion.models import Skill
 from geomotion.scores.conditions import merged
-from geomotion.scores.evaluation import Evaluation
-from geomotion.stages.evaluate import EvaluateConfig, audit, compute
+from geomotion.scores.equilibrium import judge_equilibrium
+from geomotion.scores.evaluation import Evaluation, combine
+from geomotion.stages.evaluate import EvaluateConfig, audit, compute, state_unit
 from geomotion.stages.evaluate import evaluate as evaluate_unconditional
+from geomotion.stages.evaluate_obstacles import certificate_part, judge_among_obstacles
+from geomotion.stages.safety import safe
 from geomotion.tracking import Artefacts, StageRun
 
 
 @dataclass(frozen=True)
 class Judged:
-    """What was found about one condition."""
+    """What was found about one condition, and which part of it among obstacles."""
 
     name: str
     skill: Skill
     condition: tuple[float, ...]
     evaluation: Evaluation
+    among_obstacles: Evaluation
 
 
 def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
@@ -44,7 +48,7 @@ def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: Stage
     scores of each; ``conditions/`` holds the arrays of each.
 
     Raises:
-        InvalidSetting: If the peers' protocol is asked for on other data than theirs.
+        InvalidSetting: If the peers' protocol is asked for on other data than theirs, or an obstacle does not fit.
     """
     skill = conditional_models.load(inputs["train"].path("model.pt"))
     if isinstance(skill, Skill):
@@ -53,18 +57,17 @@ def evaluate(config: EvaluateConfig, inputs: Mapping[str, Artefacts], run: Stage
     if config.evaluation.protocol is Protocol.peers:
         raise InvalidSetting("evaluation", "peers", "heldout: peers publish nothing about conditions")
     demonstrations = storage.load(inputs["ingest"].folder)
+    safe(config.safety, config.obstacle, skill, demonstrations)  # refuses
     certificate = read_json(inputs["train"].path("certificate.json"))
     judged = [
-        Judged(
-            name,
-            plain,
-            condition,
-            compute(plain, demonstrations, certificate["rate_per_s"], config.evaluation, config.solver),
-        )
+        _judge(name, condition, plain, demonstrations, certificate["rate_per_s"], config)
         for name, condition, plain in _skills(skill, demonstrations)
     ]
     whole = merged([one.evaluation for one in judged])
     certificate["audit"] = audit(whole)
+    among = merged([one.among_obstacles for one in judged])
+    if among.scores:
+        certificate["obstacles"] = certificate_part(among)
 
     document = whole.document(config.evaluation.protocol.value, demonstrations.name)
     document["conditions"] = [_document(one, skill) for one in judged]
@@ -92,6 +95,28 @@ def _skills(skill: ConditionalSkill, demonstrations: Demonstrations) -> list[tup
         )
         found.append((name, condition, replace(plain, train_demos=train, test_demos=test)))
     return found
+
+
+def _judge(
+    name: str,
+    condition: tuple[float, ...],
+    skill: Skill,
+    demonstrations: Demonstrations,
+    proven_rate: float | None,
+    config: EvaluateConfig,
+) -> Judged:
+    settings, solver = config.evaluation, config.solver
+    alone = compute(skill, demonstrations, proven_rate, settings, solver)
+    ends = [demonstrations[number].state(skill.state_channels)[-1] for number in skill.train_demos]
+    rest = judge_equilibrium(
+        skill.field,
+        skill.goal.double().numpy(),
+        np.mean(ends, axis=0),
+        skill.geometry.scale_m,
+        state_unit(skill.state_channels),
+    )
+    among = judge_among_obstacles(skill, demonstrations, config.obstacle, settings, solver)
+    return Judged(name, skill, condition, combine([alone, rest, among]), among)
 
 
 def _document(judged: Judged, skill: ConditionalSkill) -> dict[str, Any]:

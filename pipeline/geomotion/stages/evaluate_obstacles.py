@@ -66,7 +66,9 @@ def judge_among_obstacles(
     times_s = np.linspace(0, settings.goal_duration * skill.geometry.duration_s, PASSAGE_TIMES)
     return combine(
         [
-            judge_modulated_contraction(steady, chart, array.tensor(grid.points), grid.note),
+            judge_modulated_contraction(steady, chart, array.tensor(grid.points), grid.note)
+            if skill.field.is_onto
+            else Evaluation(omitted={"obstacles.contraction": "the claimed metric is one of the decoder's manifold"}),
             judge_modulated_nearby(roll, array.to_claimed, free(nearby), time_s),
             judge_passage(
                 field.obstacles,

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from geomotion.config import DatasetConfig
 from geomotion.demos import readers, storage
+from geomotion.demos.orientations import check_orientations
 from geomotion.demos.preprocessing import preprocess
 from geomotion.demos.selection import split, state_channels
 from geomotion.demos.summary import summarise, summary_table
@@ -26,7 +27,9 @@ def ingest(config: DatasetConfig, inputs: Mapping[str, Artefacts], run: StageRun
         DatasetError: If they break a rule.
         InvalidSetting: If the configuration does not fit them.
     """
-    demonstrations = preprocess(readers.read(config), config.preprocess)
+    recorded = readers.read(config)
+    check_orientations(recorded)
+    demonstrations = preprocess(recorded, config.preprocess)
     state_channels(config, demonstrations)  # refuses wrong ones before anything is written
     _, held_out = split(config, demonstrations)
     digest = storage.save(demonstrations, run.folder)

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from geomotion import conditional_models
 from geomotion.config import DatasetConfig, NcdsConfig, NoObstacle
 from geomotion.figures.report.conditions import condition_rows
 from geomotion.figures.studies.fields import FIELD_STUDY_FIGURES
@@ -10,8 +11,10 @@ from geomotion.models import ModelConfig
 from geomotion.stages import compare, shared
 from geomotion.stages.evaluate import EvaluateConfig, scores_table
 from geomotion.stages.evaluate_conditions import evaluate
-from geomotion.stages.export import ExportConfig, export
+from geomotion.stages.export import EXAMPLE, ExportConfig, export, policy_summary
 from geomotion.stages.ingest import ingest
+from geomotion.stages.policy_motion import leads_an_arm
+from geomotion.stages.policy_replay import PolicyReplayConfig, policy_replay_table, replay_policy
 from geomotion.stages.report import ReportConfig, report
 from geomotion.stages.rollout import RolloutStageConfig, rollout, rollout_table
 from geomotion.stages.session import Program, Session, Step, VerbResult
@@ -31,32 +34,44 @@ def _train_config(session: Session) -> TrainConfig:
         model=ModelConfig(config.chart, config.field, config.regulariser, config.seed, config.time_law),
         training=config.training,
         seed=config.seed,
+        space=config.space,
+        pose=config.pose,
+        vae=config.vae,
     )
 
 
 def _rollout_config(session: Session) -> RolloutStageConfig:
-    return RolloutStageConfig(session.config.rollout, session.config.solver, session.config.obstacle)
+    config: NcdsConfig = session.config
+    return RolloutStageConfig(config.rollout, config.solver, config.obstacle, config.safety)
 
 
 def _evaluate_config(session: Session) -> EvaluateConfig:
-    return EvaluateConfig(session.config.evaluation, session.config.solver, session.config.obstacle)
+    config: NcdsConfig = session.config
+    return EvaluateConfig(config.evaluation, config.solver, config.obstacle, config.safety)
 
 
 def _export_config(session: Session) -> ExportConfig:
-    return ExportConfig(session.config.tracking.register_as)
+    return ExportConfig(session.config.policy, session.config.tracking.register_as)
+
+
+def _replay_config(session: Session) -> PolicyReplayConfig:
+    return PolicyReplayConfig(session.config.replay, session.config.obstacle)
 
 
 def _report_config(session: Session) -> ReportConfig:
     return ReportConfig(command=session.reproduction)
 
 
+REPORTED = ("ingest", "train", "rollout", "evaluate", "export")
 STEPS = {
     "ingest": Step(Stage("ingest", ingest, reads_outside=True), (), lambda session: session.config.dataset),
     "train": Step(Stage("train", train), ("ingest",), _train_config),
     "rollout": Step(Stage("rollout", rollout), ("ingest", "train"), _rollout_config),
     "evaluate": Step(Stage("evaluate", evaluate), ("ingest", "train"), _evaluate_config),
-    "export": Step(Stage("export", export), ("train",), _export_config),
-    "report": Step(Stage("report", report), ("ingest", "train", "rollout", "evaluate", "export"), _report_config),
+    "export": Step(Stage("export", export), ("ingest", "train"), _export_config),
+    "replay": Step(Stage("replay", replay_policy), ("ingest", "train"), _replay_config),
+    "report": Step(Stage("report", report), (*REPORTED, "replay"), _report_config),
+    "report without robot": Step(Stage("report", report), REPORTED, _report_config),
 }
 
 
@@ -85,11 +100,38 @@ def _evaluate(session: Session) -> VerbResult:
     )
 
 
+def _export(session: Session) -> VerbResult:
+    found = session.produce("export")
+    policy = read_json(found.path("policy.json"))
+    text = f"{policy_summary(policy)}\n\npolicy   {found.path('policy.onnx')}\nexample  {found.path(EXAMPLE)}"
+    return VerbResult(text, session.document(policy=policy))
+
+
+def _replay(session: Session) -> VerbResult:
+    found = session.produce("replay")
+    document = read_json(found.path("replay.json"))
+    film = found.folder / "film.gif"
+    text = policy_replay_table(document) + (f"\n\nfilm  {film}" if film.exists() else "")
+    return VerbResult(text, session.document(replay=document), exit_code=0 if document["executed"] else NOT_EXECUTED)
+
+
+def _report(session: Session) -> VerbResult:
+    """With what the arm did, where states are something that an arm can follow."""
+    skill = conditional_models.load(session.produce("train").path("model.pt"))
+    name = "report" if leads_an_arm(skill) else "report without robot"
+    path = str(session.produce(name).path("report.html"))
+    return VerbResult(f"report  {path}", session.document(report=path))
+
+
 def _run(session: Session) -> VerbResult:
-    rolled, evaluated, reported = _rollout(session), _evaluate(session), shared.report_verb(session)
+    rolled, evaluated, reported = _rollout(session), _evaluate(session), _report(session)
     document = evaluated.document | reported.document
     among_obstacles = not isinstance(session.config.obstacle, NoObstacle)
-    text = f"{rolled.text}\n\n{evaluated.text}" if among_obstacles else evaluated.text
+    texts = [rolled.text, evaluated.text] if among_obstacles else [evaluated.text]
+    if "replay" in session.done:
+        document["replay"] = read_json(session.done["replay"].path("replay.json"))
+        texts.append(policy_replay_table(document["replay"]))
+    text = "\n\n".join(texts)
     return VerbResult(f"{text}\n{reported.text}", document, objective=evaluated.objective)
 
 
@@ -99,6 +141,8 @@ def _certificate_line(certificate: dict[str, Any]) -> str:
     return f"contraction  {certificate['claim'].replace('_', ' ')}{proven}; metric: {certificate['metric']}"
 
 
+NOT_EXECUTED = 3  # a start that the arm cannot take: an answer, not a mistake; scripts can tell it from both
+
 NCDS = Program(
     name="ncds",
     steps=STEPS,
@@ -107,11 +151,13 @@ NCDS = Program(
         "train": _train,
         "rollout": _rollout,
         "eval": _evaluate,
-        "report": shared.report_verb,
+        "export": _export,
+        "replay": _replay,
+        "report": _report,
         "run": _run,
         "compare": shared.compare_verb,
         "check": shared.check_verb,
     },
-    execution_keys=shared.EXECUTION_KEYS | {"solver", "rollout"},
+    execution_keys=shared.EXECUTION_KEYS | {"solver", "rollout", "replay", "policy", "safety"},
     study_figures=FIELD_STUDY_FIGURES,
 )

@@ -10,6 +10,7 @@ import torch
 
 from geomotion.conditional_models import ConditionalSkill
 from geomotion.config import ObstacleConfig, RolloutConfig, SeveralObstacles, SolidObstacle, SolverConfig
+from geomotion.dynamics.injective import rollout_on_manifold
 from geomotion.dynamics.linear import LinearField
 from geomotion.dynamics.potential import PotentialField
 from geomotion.dynamics.rollout import Rollout, RolloutStatus
@@ -115,8 +116,17 @@ def phases(
     ]
 
 
-def follow_phases(all_phases: Sequence[Phase], start: Start, solver: SolverConfig) -> Followed:
-    """Follow one field after the other; phases that begin after the last wanted time never do."""
+def follow_phases(
+    all_phases: Sequence[Phase], start: Start, solver: SolverConfig, on_manifold: bool = False
+) -> Followed:
+    """Follow one field after the other; phases that begin after the last wanted time never do.
+
+    Args:
+        all_phases: Fields and when they begin.
+        start: Where and when.
+        solver: How trajectories are computed.
+        on_manifold: Whether the skill has a decoder on whose manifold the start is: in free space codes are followed.
+    """
     dtype = all_phases[0].skill.goal.dtype
     state, wanted = torch.as_tensor(start.state, dtype=dtype)[None], torch.as_tensor(start.times, dtype=dtype)
     begun = [phase for phase in all_phases if phase.begins_s < float(wanted[-1]) or phase.begins_s == 0]
@@ -125,7 +135,7 @@ def follow_phases(all_phases: Sequence[Phase], start: Start, solver: SolverConfi
     for phase, end in zip(begun, ends, strict=True):
         own = wanted[(wanted >= phase.begins_s) & (wanted < end)]
         grid = torch.unique(torch.cat([own, wanted.new_tensor([phase.begins_s, min(end, float(wanted[-1]))])]))
-        found = _follow(phase, state, grid, solver)
+        found = _follow(phase, state, grid, solver, on_manifold)
         kept = found.states[0, torch.isin(grid, own)]
         parts.append(kept)
         velocities.append(_velocities(phase, kept, own))
@@ -142,7 +152,9 @@ def follow_phases(all_phases: Sequence[Phase], start: Start, solver: SolverConfi
     )  # fmt: skip
 
 
-def _follow(phase: Phase, state: Float[Tensor, "1 D"], times: Times, solver: SolverConfig) -> Rollout:
+def _follow(
+    phase: Phase, state: Float[Tensor, "1 D"], times: Times, solver: SolverConfig, on_manifold: bool
+) -> Rollout:
     geometry = phase.skill.geometry
     centre = torch.tensor(geometry.centre).to(state)
     reach = REGION * 2 * geometry.scale_m
@@ -155,6 +167,8 @@ def _follow(phase: Phase, state: Float[Tensor, "1 D"], times: Times, solver: Sol
         "goal_tolerance": GOAL_TOLERANCE * 2 * geometry.scale_m,
         "region": (centre - reach, centre + reach),
     }
+    if phase.field is None and on_manifold:
+        return rollout_on_manifold(phase.skill.field, state, times, **options)
     if phase.field is None:
         return follow(phase.skill.field, state, times, **options)
     return rollout_among_obstacles(phase.field, state, times, **options)
@@ -182,8 +196,9 @@ def _change(phase: Phase, states: Float[Tensor, "time D"], times: Times) -> dict
     }
     if phase.field is not None or not isinstance(field.field, LinearField | PotentialField):
         return change
-    distances = field.chart.to_latent(states[[0, -1]]).norm(dim=-1).tolist()
-    decay = math.exp(-field.field.rate * float(field.progress((times[-1] - times[0]) / field.time_unit_s)))
+    z = field.chart.to_latent(states[[0, -1]])
+    progress = field.law_at(z).progress((times[-1] - times[0]) / field.time_unit_s)
+    distances, decay = z.norm(dim=-1).tolist(), math.exp(-field.field.rate * float(progress))
     bound = {"metric_distance": distances[0], "at_end": distances[1], "bound_at_end": decay * distances[0]}
     return change | bound if all(map(math.isfinite, distances)) else change
 

@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 
 from geomotion.demos import storage
-from geomotion.demos.demonstrations import Demonstrations, Trajectory
 from geomotion.errors import InvalidSetting
-from geomotion.figures.replay import ReplayPicture, save_replay_figure
+from geomotion.figures.replay import save_replay_figure
 from geomotion.files import read_json, write_json
-from geomotion.robot.recording import Tracking
 from geomotion.scores.configurations import ConfigurationPath
 from geomotion.scores.paths import QUATERNION, MotionPath, PosePath
+from geomotion.stages.executed import executed_trajectory, tracking_document, tracking_picture, tracking_rows
 from geomotion.stages.execution import Planned, Replay, ReplayStageConfig, execute
 from geomotion.stages.graph import load_skilled
 from geomotion.stages.scene import solids
@@ -44,10 +43,13 @@ def replay(config: ReplayStageConfig, inputs: Mapping[str, Artefacts], run: Stag
     demonstrations = storage.load(inputs["ingest"].folder)
     done = execute(config, skilled, demonstrations, _planned(inputs["plan"], plan["legs"], first))
     write_json(run.folder / "replay.json", _document(config, done))
-    storage.save(_trajectory(demonstrations, done), run.folder / "trajectory")
+    doing = "planned by geomotion from"
+    storage.save(
+        executed_trajectory(demonstrations, done.arm, done.tracking, "geodesic", doing), run.folder / "trajectory"
+    )
     if done.film is not None:
         done.film.save(run.folder / "film.gif")
-    save_replay_figure(_picture(done), run.folder / "figures")
+    save_replay_figure(tracking_picture(done.arm, done.tracking, _stretch(done)), run.folder / "figures")
 
 
 def replay_table(document: Mapping[str, Any]) -> str:
@@ -67,15 +69,7 @@ def replay_table(document: Mapping[str, Any]) -> str:
             f"{np.degrees(document['tracking_worst_rad']):.2f} deg",
         ),
     ]
-    if document["limit_margin_rad"] is not None:
-        rows.append(("joint-limit margin", f"{np.degrees(document['limit_margin_rad']):.1f} deg"))
-    if document["self_clearance"] is not None:
-        links, apart = document["self_clearance"]["links"], document["self_clearance"]["distance_m"]
-        rows.append(("links to each other", f"{1000 * apart:.1f} mm ({' to '.join(links)})"))
-    if document["clearance_m"]:
-        link, apart = min(document["clearance_m"].items(), key=lambda item: item[1])
-        rows.append(("smallest clearance", f"{1000 * apart:.1f} mm ({link})"))
-        rows.append(("contacts", ", ".join(document["contacts"]) or "none"))
+    rows += tracking_rows(document)
     if document["closed_loop"]:
         reached = "reached" if document["reached_goal"] else "not reached"
         rows.append(("goal", f"{reached}; {document['waited_s']:.2f} s without a way on"))
@@ -101,23 +95,15 @@ def _document(config: ReplayStageConfig, done: Replay) -> dict[str, Any]:
     tracking, joints, pilot = done.tracking, done.joints, done.pilot
     return {
         "executed": True,
-        "arm": done.arm.name,
         "states": "configurations" if isinstance(done.path, ConfigurationPath) else "poses",
-        "frame": done.arm.tip_link,
         "timing": config.robot.timing.value,
-        "duration_s": float(tracking.time_s[-1]),
         "stretch": _stretch(done),
         "reached_share": 1 - len(done.unreachable) / done.asked,
         "unreachable": [vars(one) for one in done.unreachable],
         "ik_worst_m": float(joints.position_error_m.max()),
         "ik_worst_rad": float(joints.orientation_error_rad.max()),
         "largest_joint_step_rad": joints.largest_step_rad,
-        "tracking_worst_m": float(tracking.position_error_m.max()),
-        "tracking_worst_rad": float(tracking.orientation_error_rad.max()),
-        "limit_margin_rad": _finite(tracking.limit_margin_rad.min()),
-        "self_clearance": _self_clearance(tracking),
-        "clearance_m": tracking.smallest_clearance_m if solids(config.obstacle) else {},
-        "contacts": tracking.contact_steps,
+        **tracking_document(done.arm, tracking, bool(solids(config.obstacle))),
         "closed_loop": pilot is not None,
         "replans": 0 if pilot is None else len(pilot.seconds),
         "replan_median_ms": None if pilot is None else 1000 * float(np.median(pilot.seconds)),
@@ -126,53 +112,6 @@ def _document(config: ReplayStageConfig, done: Replay) -> dict[str, Any]:
     }
 
 
-def _self_clearance(tracking: Tracking) -> dict[str, Any] | None:
-    """The two links that come nearest to each other; None if all stay as far apart as is measured."""
-    if not tracking.self_clearance_m:
-        return None
-    links, distance_m = min(tracking.self_clearance_m.items(), key=lambda item: item[1])
-    return {"links": list(links), "distance_m": distance_m}
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
 def _stretch(done: Replay) -> float:
     """How many times longer than its own timing the motion took; a closed loop has no timing of its own."""
     return done.timed.stretch if done.pilot is None else 1.0
-
-
-def _trajectory(demonstrations: Demonstrations, done: Replay) -> Demonstrations:
-    """What was executed, in the layout of demonstrations, to be run elsewhere."""
-    tracking = done.tracking
-    channels = {
-        "position_m": tracking.position_m,
-        "orientation_wxyz": tracking.orientation_wxyz,
-        "joints_rad": tracking.commanded_joints_rad,
-    }
-    one = Trajectory(tracking.time_s - tracking.time_s[0], channels, "geodesic")
-    return Demonstrations(
-        f"{demonstrations.name}/replay",
-        (one,),
-        "R3xS3xjoint",
-        f"{done.arm.base_link} of {done.arm.name}; poses of {done.arm.tip_link}",
-        f"planned by geomotion from {demonstrations.name} and executed in simulation; {demonstrations.source}",
-        demonstrations.licence,
-    )
-
-
-def _picture(done: Replay) -> ReplayPicture:
-    tracking = done.tracking
-    commanded_m, _ = done.arm.chain.pose(tracking.commanded_joints_rad)
-    return ReplayPicture(
-        tracking.time_s,
-        tracking.position_error_m,
-        tracking.orientation_error_rad,
-        tracking.limit_margin_rad,
-        tracking.clearance_time_s,
-        tracking.clearance_m,
-        commanded_m,
-        tracking.position_m,
-        _stretch(done),
-    )

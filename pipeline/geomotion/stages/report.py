@@ -11,17 +11,20 @@ from geomotion.errors import CorruptArtefact
 from geomotion.figures.arrays import EvaluationArrays, read_evaluation
 from geomotion.figures.report.conditions import condition_rows
 from geomotion.figures.report.ncds_caveats import caveats
-from geomotion.figures.report.ncds_pictures import CAPTIONS, missing
+from geomotion.figures.report.ncds_pictures import CAPTIONS, FILM, missing
 from geomotion.figures.report.ncds_scores import FIELD, headlines
 from geomotion.figures.report.ncds_verdict import verdict
 from geomotion.figures.report.page import Column, Data, Listing, Origin, Page, render
-from geomotion.figures.report.pictures import pictures
+from geomotion.figures.report.pictures import Picture, film, pictures
 from geomotion.figures.report.scores import tables
 from geomotion.files import read_json, write_text
+from geomotion.stages.export import differences
+from geomotion.stages.policy_replay import policy_replay_rows
 from geomotion.tracking import Artefacts, StageRun
 
 Document = Mapping[str, Any]
-STAGES = ("ingest", "train", "rollout", "evaluate", "export")
+STAGES = ("ingest", "train", "rollout", "evaluate", "export", "replay")
+PICTURED = ("ingest", "train", "evaluate", "replay")
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ def report(config: ReportConfig, inputs: Mapping[str, Artefacts], run: StageRun)
 
     Args:
         config: Title and command.
-        inputs: Stages ``ingest``, ``train``, ``evaluate``, and ``rollout`` and ``export`` if there were any.
+        inputs: Stages ``ingest``, ``train``, ``evaluate``, and ``rollout``, ``export``, ``replay`` if there were any.
         run: Where to write.
 
     Raises:
@@ -58,7 +61,7 @@ def compose(config: ReportConfig, inputs: Mapping[str, Artefacts]) -> Page:
     certificate: Document = read_json(inputs["evaluate"].path("certificate.json"))
     judged: Document = read_json(inputs["evaluate"].path("scores.json"))
     data = read_evaluation(inputs["evaluate"].path("evaluation.npz"))
-    shown = pictures([inputs[name].folder / "figures" for name in ("ingest", "train", "evaluate")], CAPTIONS)
+    shown = pictures([inputs[name].folder / "figures" for name in PICTURED if name in inputs], CAPTIONS)
     training = recorded(inputs["train"], "config.json")
     facts = _facts(summary, data, judged, training) | training_facts(inputs["train"]) | _policy_facts(inputs)
     return Page(
@@ -72,7 +75,8 @@ def compose(config: ReportConfig, inputs: Mapping[str, Artefacts]) -> Page:
         origin=origin(config.command, inputs, STAGES),
         caveats=caveats(data, str(certificate.get("claim")), str(judged["protocol"])),
         omitted=missing(shown, data) | _omitted(judged, inputs),
-        listings=(*_conditions(judged), *_rollouts(inputs)),
+        listings=(*_conditions(judged), *_rollouts(inputs), *_replayed(inputs)),
+        film=_film(inputs),
     )
 
 
@@ -135,8 +139,8 @@ def _policy_facts(inputs: Mapping[str, Artefacts]) -> dict[str, str]:
     if "export" not in inputs:
         return {}
     policy: Document = read_json(inputs["export"].path("policy.json"))
-    differs = f"at most {policy['max_difference_to_torch_m_per_s']:.1g} m/s from the trained one"
-    return {"Exported policy": f"ONNX, {policy['query_time_ms']:.2g} ms for one velocity, {differs}"}
+    speed = f"ONNX, {policy['query_time_ms']:.2g} ms for one velocity"
+    return {"Exported policy": f"{speed}, at most {differences(policy)} from the trained one"}
 
 
 def _conditions(judged: Document) -> tuple[Listing, ...]:
@@ -159,6 +163,20 @@ def _rollouts(inputs: Mapping[str, Artefacts]) -> tuple[Listing, ...]:
     )
     columns = (*(Column(name) for name in names), Column("outcome", is_text=True))
     return (Listing("Rollouts", columns, rows),) if rows else ()
+
+
+def _replayed(inputs: Mapping[str, Artefacts]) -> tuple[Listing, ...]:
+    if "replay" not in inputs:
+        return ()
+    replay: Document = read_json(inputs["replay"].path("replay.json"))
+    rows = policy_replay_rows(replay) if replay["executed"] else [("not executed", str(replay["reason"]))]
+    columns = Column("quantity", is_text=True), Column("measured in simulation", is_text=True)
+    return (Listing("In closed loop on the simulated arm", columns, tuple(rows)),)
+
+
+def _film(inputs: Mapping[str, Artefacts]) -> Picture | None:
+    path = inputs["replay"].folder / "film.gif" if "replay" in inputs else None
+    return film(path, *FILM) if path is not None and path.is_file() else None
 
 
 def _to_goal(row: Document) -> str:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from dataclasses import field as default
 from itertools import product
 from typing import Any
 
@@ -11,9 +12,10 @@ import torch
 
 from geomotion import conditional_models
 from geomotion.conditional_models import ConditionalSkill
-from geomotion.config import ObstacleConfig, RolloutConfig, SolverConfig
+from geomotion.config import NoObstacle, NoSafety, ObstacleConfig, RolloutConfig, SafetyConfig, SolverConfig
 from geomotion.demos import storage
 from geomotion.demos.demonstrations import VELOCITY_OF, Demonstrations, Trajectory
+from geomotion.demos.pose_vectors import POSE_CHANNEL, with_pose_vectors
 from geomotion.dynamics.rollout import RolloutStatus
 from geomotion.errors import InvalidSetting
 from geomotion.figures.arrays import Flow
@@ -22,10 +24,15 @@ from geomotion.figures.style import save_figure
 from geomotion.files import write_json
 from geomotion.models import Skill
 from geomotion.obstacles.obstacle import surface_points
+from geomotion.safe_skills import SafeSkill
 from geomotion.scores.grids import bounding_box, sample_box
 from geomotion.stages.phases import Followed, Phase, Start, follow_phases, phases
+from geomotion.stages.safe_motion import follow_in_region
+from geomotion.stages.safety import safe
+from geomotion.stages.transition import follow_after_transition
 from geomotion.tables import aligned
 from geomotion.tracking import Artefacts, StageRun
+from geomotion.types import Float, Tensor
 
 OUTLINE_POINTS = 200
 CORNER = "corner"
@@ -43,6 +50,7 @@ class RolloutStageConfig:
     rollout: RolloutConfig
     solver: SolverConfig
     obstacle: ObstacleConfig
+    safety: SafetyConfig = default(default_factory=NoSafety)
 
 
 def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
@@ -57,18 +65,23 @@ def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: St
     """
     skill = conditional_models.load(inputs["train"].path("model.pt"))
     demonstrations = storage.load(inputs["ingest"].folder)
+    if isinstance(skill, Skill):
+        demonstrations = with_pose_vectors(demonstrations, skill.pose)
+    region = safe(config.safety, config.obstacle, skill, demonstrations)
+    if region is not None:
+        skill = replace(region.skill, field=region.charted_field())
+    obstacle = config.obstacle if region is None else NoObstacle()
     starts = _starts(config.rollout, demonstrations, skill)
     planned = {
-        condition: phases(config.rollout, config.obstacle, skill, condition)
+        condition: phases(config.rollout, obstacle, skill, condition)
         for condition in dict.fromkeys(start.condition for start in starts)
     }
     followed = [
-        (start, planned[start.condition], follow_phases(planned[start.condition], start, config.solver))
-        for start in starts
+        (start, planned[start.condition], _follow(config, region, planned[start.condition], start)) for start in starts
     ]
-    channel = _channels(skill)[0]
+    channels = _channels(skill)
     trajectories = tuple(
-        found for start, _, outcome in followed if (found := _trajectory(channel, start, outcome)) is not None
+        found for start, _, outcome in followed if (found := _trajectory(skill, start, outcome)) is not None
     )
     if not trajectories:
         labels = ", ".join(start.label for start in starts)
@@ -78,7 +91,7 @@ def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: St
             demonstrations,
             name=f"{demonstrations.name}/rollouts",
             trajectories=trajectories,
-            space=f"R{len(starts[0].state)}",
+            space=demonstrations.space if POSE_CHANNEL in channels else f"R{len(starts[0].state)}",
             condition_names=(),  # conditions may change on the way; rollouts.json has them
             source=f"computed by a field learned from {demonstrations.name}; {demonstrations.source}",
         ),
@@ -87,8 +100,17 @@ def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: St
     write_json(run.folder / "rollouts.json", {"rollouts": [_row(*one) for one in followed]})
     if len(starts[0].state) == 2:
         demonstrated = [one.state(_channels(skill)) for one in demonstrations.trajectories]
-        picture = _picture(followed, demonstrated, [(one.label, one.channels[channel]) for one in trajectories])
+        picture = _picture(followed, demonstrated, [(one.label, one.channels[channels[0]]) for one in trajectories])
         save_figure(figure_rollouts(picture), run.folder / "figures", "rollouts", picture.arrays())
+
+
+def _follow(config: RolloutStageConfig, region: SafeSkill | None, all_phases: list[Phase], start: Start) -> Followed:
+    if region is not None:
+        return follow_in_region(region, start)
+    transition_s = config.rollout.transition_s
+    if transition_s is None or all_phases[0].skill.field.is_onto:
+        return follow_phases(all_phases, start, config.solver)
+    return follow_after_transition(all_phases, start, config.solver, transition_s)
 
 
 def rollout_table(document: Mapping[str, Any]) -> str:
@@ -122,10 +144,10 @@ def _chosen_starts(
     config: RolloutConfig, demonstrations: Demonstrations, skill: Skill | ConditionalSkill
 ) -> list[Start]:
     if config.starts_m is not None:
-        plain = skill if isinstance(skill, Skill) else skill.augmented
-        dim = plain.field.dim - plain.geometry.context
+        plain = skill if isinstance(skill, Skill) else skill.given(config.condition or [], "rollout.condition")
         times = np.linspace(0.0, config.duration_s or plain.geometry.duration_s, config.points or 1000)
-        return [Start(f"start {number}", _state(start, dim), times) for number, start in enumerate(config.starts_m)]
+        states = [_state(start, plain.field.dim) for start in config.starts_m]
+        return [Start(f"start {number}", state, times) for number, state in enumerate(states)]
     chosen = demonstrations.select(config.demos if config.demos is not None else range(len(demonstrations)))
     numbers = config.demos if config.demos is not None else range(len(demonstrations))
     starts = []
@@ -143,14 +165,29 @@ def _state(start: list[float], dim: int) -> np.ndarray:
     return np.asarray(start, dtype=float)
 
 
-def _trajectory(channel: str, start: Start, outcome: Followed) -> Trajectory | None:
+def _trajectory(skill: Skill | ConditionalSkill, start: Start, outcome: Followed) -> Trajectory | None:
     """What a robot can execute of a rollout: all points before the first that is not finite, if they are two."""
     is_finite = torch.cat([outcome.states, outcome.velocities], dim=-1).isfinite().all(dim=-1)
     points = int(is_finite.int().cumprod(0).sum())
     if points < 2:
         return None
-    states, velocities = (values[:points].double().numpy() for values in (outcome.states, outcome.velocities))
-    return Trajectory(start.times[:points], {channel: states, VELOCITY_OF[channel]: velocities}, start.label)
+    states, velocities = outcome.states[:points].double(), outcome.velocities[:points].double()
+    return Trajectory(start.times[:points], _robot_channels(skill, states, velocities), start.label)
+
+
+def _robot_channels(
+    skill: Skill | ConditionalSkill, states: Float[Tensor, "time D"], velocities: Float[Tensor, "time D"]
+) -> dict[str, np.ndarray]:
+    plain = skill if isinstance(skill, Skill) else skill.augmented
+    if plain.pose is None:
+        channel = plain.state_channels[0]
+        return {channel: states.numpy(), VELOCITY_OF[channel]: velocities.numpy()}
+    position, orientation = plain.pose.to_pose(states)
+    return {
+        "position_m": position.numpy(),
+        "orientation_wxyz": orientation.numpy(),
+        VELOCITY_OF["position_m"]: velocities[:, :3].numpy(),
+    }
 
 
 def _picture(

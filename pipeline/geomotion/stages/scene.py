@@ -11,6 +11,7 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from geomotion import config as schema
+from geomotion.dynamics.fields import VectorField
 from geomotion.errors import InvalidSetting
 from geomotion.models import Skill
 from geomotion.obstacles.body import Body
@@ -32,15 +33,51 @@ def modulated(config: schema.ObstacleConfig, skill: Skill) -> ModulatedField | N
     Raises:
         InvalidSetting: If an obstacle does not fit the state, or one at rest covers the goal.
     """
+    return around_obstacles(config, skill.field, skill.goal)
+
+
+def around_obstacles(
+    config: schema.ObstacleConfig, field: VectorField, goal: Float[Tensor, " D"]
+) -> ModulatedField | None:
+    """A field with obstacles in it; nothing in free space.
+
+    Args:
+        config: The obstacles.
+        field: In the precision of the goal.
+        goal: Where it leads.
+
+    Raises:
+        InvalidSetting: If an obstacle does not fit the state, or one at rest covers the goal.
+    """
     bodies = solids(config)
     if not isinstance(config, schema.Avoidance) or not bodies:
         return None
-    obstacles = [_avoidable(body, skill.goal) for body in bodies]
+    obstacles = [_avoidable(body, goal) for body in bodies]
     for body, obstacle in zip(bodies, obstacles, strict=True):
-        if float(obstacle.level(skill.goal)) < 1 and not bool(obstacle.velocity.any()):
+        if float(obstacle.level(goal)) < 1 and not bool(obstacle.velocity.any()):
             raise InvalidSetting("obstacle.centre_m", body.centre_m, "an obstacle that leaves the goal free")
     _refuse_overlaps(obstacles)
-    return ModulatedField(skill.field, obstacles, config.reactivity, config.escape, config.recovery_time_s, config.hold)
+    return ModulatedField(field, obstacles, config.reactivity, config.escape, config.recovery_time_s, config.hold)
+
+
+def grown(config: schema.ObstacleConfig, by_m: float) -> schema.ObstacleConfig:
+    """The same obstacles with everything inside them that is nearer than a length [m], for points of larger bodies."""
+    match config:
+        case schema.SeveralObstacles():
+            return replace(config, bodies=[grown(body, by_m) for body in solids(config)])
+        case schema.SphereObstacle():
+            return replace(config, radius_m=config.radius_m + by_m)
+        case schema.EllipsoidObstacle():
+            # a convex body holds its inner ball: as much larger as that one grows, it contains all that is near
+            factor = 1 + by_m / min(config.semi_axes_m)
+            return replace(config, semi_axes_m=[factor * length for length in config.semi_axes_m])
+        case schema.BoxObstacle():
+            rounding = config.rounding_m if config.rounding_m is not None else min(config.sides_m) / 4
+            return replace(config, sides_m=[side + 2 * by_m for side in config.sides_m], rounding_m=rounding + by_m)
+        case schema.MeshObstacle() if by_m > 0:
+            return replace(config, rounding_m=(config.rounding_m or 0.0) + by_m)
+        case _:
+            return config
 
 
 def _avoidable(config: schema.SolidObstacle, like: Float[Tensor, " D"]) -> Obstacle:

@@ -36,7 +36,7 @@ def run_study(session: Session, verb: str) -> VerbResult:
         state = "done" if outcome.failure is None else f"failed: {outcome.failure}"
         logger.info("study: %d of %d, %s: %s", len(outcomes), len(cells), outcome.cell.name, state)
 
-    ordered = [outcomes[cell.name] for cell in cells]
+    ordered = [outcomes[composed.cell.name] for composed in cells]
     config = StudyStageConfig(replace(study, jobs=1), [_record(one) for one in ordered], session.reproduction)
     inputs = {f"evaluate_{n}": one.done["evaluate"] for n, one in enumerate(ordered) if one.failure is None}
     stage = Stage("study", partial(summarise_study, draw=program.study_figures))
@@ -55,6 +55,5 @@ def _cell_document(outcome: Outcome) -> dict[str, Any]:
 
 
 def _record(outcome: Outcome) -> CellRecord:
-    cell = outcome.cell
     run_id = outcome.done["evaluate"].run_id if outcome.failure is None else None
-    return CellRecord(cell.variant, cell.dataset, cell.seed, list(cell.overrides), run_id, outcome.failure)
+    return CellRecord(outcome.cell, run_id, outcome.failure)

@@ -35,19 +35,25 @@ class Cell:
         dataset: Choice of the dataset.
         seed: Seed.
         overrides: Settings that make this run, as on the command line.
-        config: The same, composed.
     """
 
     variant: str
     dataset: str
     seed: int
-    overrides: tuple[str, ...]
-    config: CommandConfig
+    overrides: list[str]
 
     @property
     def name(self) -> str:
         """For people."""
         return f"{self.variant}, {self.dataset}, seed {self.seed}"
+
+
+@dataclass(frozen=True)
+class ComposedCell:
+    """A cell with its settings composed."""
+
+    cell: Cell
+    config: CommandConfig
 
 
 @dataclass(frozen=True)
@@ -59,7 +65,7 @@ class Outcome:
     failure: str | None = None
 
 
-def compose_cells(program: str, study: StudyConfig, typed: Sequence[str]) -> list[Cell]:
+def compose_cells(program: str, study: StudyConfig, typed: Sequence[str]) -> list[ComposedCell]:
     """Every cell with its settings: those of its variant, then those that were typed beside the study.
 
     Raises:
@@ -74,11 +80,11 @@ def compose_cells(program: str, study: StudyConfig, typed: Sequence[str]) -> lis
         config = OmegaConf.to_object(compose(program, overrides=overrides))
         assert isinstance(config, CommandConfig)
         program_of(config).check(config)
-        cells.append(Cell(variant.label, dataset, seed, tuple(overrides), config))
+        cells.append(ComposedCell(Cell(variant.label, dataset, seed, overrides), config))
     return cells
 
 
-def run_cells(cells: Sequence[Cell], study: CommandRun, jobs: int) -> Iterator[Outcome]:
+def run_cells(cells: Sequence[ComposedCell], study: CommandRun, jobs: int) -> Iterator[Outcome]:
     """Outcomes in the order in which cells end; finished stages of earlier runs are reused.
 
     Raises:
@@ -98,11 +104,11 @@ def run_cells(cells: Sequence[Cell], study: CommandRun, jobs: int) -> Iterator[O
             raise
 
 
-def run_cell(cell: Cell, study: CommandRun) -> Outcome:
+def run_cell(composed: ComposedCell, study: CommandRun) -> Outcome:
     """Run the stages of a cell up to its scores; a failure is an outcome like any other."""
-    program = program_of(cell.config)
+    cell, program = composed.cell, program_of(composed.config)
     try:
-        with open_session(program, "eval", cell.config, list(cell.overrides), study) as session:
+        with open_session(program, "eval", composed.config, cell.overrides, study) as session:
             session.produce("evaluate")
     except Interrupted:
         raise
@@ -121,7 +127,7 @@ def _prepare_process() -> None:
     torch.set_num_threads(1)
 
 
-def _run_cell_apart(cell: Cell, study: CommandRun) -> Outcome:
+def _run_cell_apart(cell: ComposedCell, study: CommandRun) -> Outcome:
     try:
         with interrupts_as_errors():
             return run_cell(cell, study)

@@ -66,7 +66,7 @@ def lines(document: Document) -> Iterator[list[str]]:
     before = None
     for row in document["rows"]:
         ours = [_cell(row["values"][one["score"]]) for one in columns]
-        theirs = [f"{value:g}" for value in row["reference"]] or ["–"] * len(others)
+        theirs = ["–" if value is None else f"{value:g}" for value in row["reference"]] or ["–"] * len(others)
         yield ["" if row["dataset"] == before else row["dataset"], row["variant"], *ours, *theirs[: len(others)]]
         before = row["dataset"]
 
@@ -82,7 +82,7 @@ def legend(document: Document) -> list[str]:
     return found
 
 
-def reference_values(reference: ReferenceConfig | None, dataset: str, variant: str) -> list[float]:
+def reference_values(reference: ReferenceConfig | None, dataset: str, variant: str) -> list[float | None]:
     """What others report of a variant on a dataset; empty if nothing."""
     rows = reference.rows if reference is not None else []
     return next((list(row.values) for row in rows if (row.dataset, row.variant) == (dataset, variant)), [])

@@ -14,6 +14,7 @@ from geomotion.figures.report.study_page import StudyPage, render_study
 from geomotion.figures.studies.panels import DrawStudy, JudgedCell, StudyFigure
 from geomotion.figures.style import save_figure
 from geomotion.files import read_json, write_json, write_text
+from geomotion.stages.study_cells import Cell
 from geomotion.stages.study_table import legend, lines, markdown_table, reference_values, table_document
 from geomotion.tracking import Artefacts, StageRun
 
@@ -23,28 +24,17 @@ TEXT_COLUMNS = 2  # dataset and variant
 
 @dataclass(frozen=True)
 class CellRecord:
-    """A cell as the page shows it.
+    """What is kept of a cell and its outcome.
 
     Attributes:
-        variant: Label of what is compared.
-        dataset: Choice of the dataset.
-        seed: Seed.
-        overrides: Settings that make the run.
+        cell: The run.
         run_id: MLflow run of its evaluation; None where it failed.
         failure: Why it failed, if it did.
     """
 
-    variant: str
-    dataset: str
-    seed: int
-    overrides: list[str]
+    cell: Cell
     run_id: str | None
     failure: str | None
-
-    @property
-    def name(self) -> str:
-        """For people."""
-        return f"{self.variant}, {self.dataset}, seed {self.seed}"
 
 
 @dataclass(frozen=True)
@@ -78,12 +68,12 @@ def summarise_study(
     """
     study = config.study
     evaluations = [inputs.get(f"evaluate_{number}") for number in range(len(config.cells))]
-    judged = [(cell, found) for cell, found in zip(config.cells, evaluations, strict=True) if found is not None]
+    judged = [(one.cell, found) for one, found in zip(config.cells, evaluations, strict=True) if found is not None]
     scores = [(cell, read_json(found.path("scores.json"))["scores"]) for cell, found in judged]
     by_row: dict[tuple[str, str], list[Document]] = {}
     for cell, own in scores:
         by_row.setdefault((cell.dataset, cell.variant), []).append(own)
-    failures = [f"{cell.name}: {cell.failure}" for cell in config.cells if cell.failure is not None]
+    failures = [f"{one.cell.name}: {one.failure}" for one in config.cells if one.failure is not None]
     table = table_document(study, by_row, failures)
     write_json(run.folder / "table.json", table)
     write_text(run.folder / "table.csv", _csv(study, scores))
@@ -100,7 +90,7 @@ def summarise_study(
     write_text(run.folder / "report.html", render_study(_page(config, table, list(shown.values()))))
 
 
-def _csv(study: StudyConfig, scores: Sequence[tuple[CellRecord, Document]]) -> str:
+def _csv(study: StudyConfig, scores: Sequence[tuple[Cell, Document]]) -> str:
     """One row for each cell, unrounded; a score that is missing or not finite is empty."""
     names, reference = [column.score for column in study.columns], study.reference
     others = [f"{reference.source}: {name}" for name in reference.columns] if reference else []
@@ -118,7 +108,7 @@ def _page(config: StudyStageConfig, table: Document, shown: Sequence[Picture]) -
     head, *rows = lines(table)
     columns = tuple(Column(name, is_text=number < TEXT_COLUMNS) for number, name in enumerate(head))
     runs = tuple(
-        (cell.name, cell.run_id or "failed", cell.failure or shlex.join(cell.overrides)) for cell in config.cells
+        (one.cell.name, one.run_id or "failed", one.failure or shlex.join(one.cell.overrides)) for one in config.cells
     )
     names = (Column("run", is_text=True), Column("evaluation", is_text=True), Column("settings", is_text=True))
     return StudyPage(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from dataclasses import field as default
 
 import numpy as np
 import pandas as pd
@@ -13,18 +14,23 @@ from geomotion.conditional_models import ConditionalSkill
 from geomotion.demos import storage
 from geomotion.demos.conditions import condition_names
 from geomotion.demos.demonstrations import Demonstrations
+from geomotion.demos.pose_vectors import POSE_CHANNEL, fit_pose_coordinates, with_pose_vectors
 from geomotion.demos.selection import split, state_channels
 from geomotion.dynamics.certificate import Certificate, certify
 from geomotion.dynamics.conditional_certificate import for_all_conditions
 from geomotion.dynamics.fields import ChartedField
+from geomotion.dynamics.injective import decoded
 from geomotion.errors import DatasetError, InvalidSetting
 from geomotion.figures.training import save_training_figure
 from geomotion.files import atomic, write_json
+from geomotion.lie.poses import Group, PoseCoordinates
 from geomotion.models import ModelConfig, Skill
+from geomotion.stages.train_decoder import train_decoder
 from geomotion.tracking import Artefacts, StageRun
 from geomotion.training.adjoint import TrajectoryShooting
 from geomotion.training.conditioning import Conditioning, with_conditions
 from geomotion.training.data import Geometry, TrainingSet
+from geomotion.training.injective_vae import encoded
 from geomotion.training.objectives import VelocityReconstruction
 from geomotion.training.trainer import Objective, Schedule, fit
 from geomotion.training.trajectories import TrajectoryReproduction
@@ -39,26 +45,34 @@ class TrainConfig:
         model: Architecture.
         training: Objective and schedule.
         seed: Seed of the optimisation.
+        space: Where states live, if they are poses.
+        pose: How poses become vectors.
+        vae: Training of a decoder, where the chart is one.
     """
 
     selection: schema.DatasetConfig
     model: ModelConfig
     training: schema.TrainingConfig
     seed: int
+    space: schema.PoseSpace | None = None
+    pose: schema.PoseConfig = default(default_factory=schema.PoseConfig)
+    vae: schema.VaeTraining = default(default_factory=schema.VaeTraining)
 
 
 def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
-    """Write ``model.pt``, ``certificate.json``, ``training.csv`` and its picture.
+    """Write ``model.pt``, ``certificate.json``, ``training.json``, ``training.csv`` and its picture.
 
     Raises:
         DatasetError: If nothing moves in the demonstrations.
         InvalidSetting: If settings do not go together, or do not fit the demonstrations.
-        TrainingDiverged: If a loss or a parameter becomes infinite.
+        TrainingDiverged: If a loss or a parameter becomes infinite again and again.
         Interrupted: If a signal arrived.
     """
     demonstrations = storage.load(inputs["ingest"].folder)
-    channels = state_channels(config.selection, demonstrations)
     train_demos, test_demos = split(config.selection, demonstrations)
+    coordinates = _pose_coordinates(config, demonstrations.select(train_demos))
+    demonstrations = with_pose_vectors(demonstrations, coordinates)
+    channels = (POSE_CHANNEL,) if coordinates else state_channels(config.selection, demonstrations)
     selected = demonstrations.select(train_demos)
     shown = data = TrainingSet.from_demonstrations(selected, channels)
     geometry = Geometry.of(data)
@@ -67,11 +81,19 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
     conditioning = _conditioning(config.model, selected, data) if selected.condition_names else None
     if conditioning is not None:
         data, geometry = with_conditions(data, _conditions(selected), conditioning)
-    field = models.build(config.model, geometry)
-    objective = _objective(config, data, geometry)
-    history = fit(field, objective, _schedule(config, geometry), run.checkpoint, run.log_series)
+    decoder = None
+    seen, place = data, geometry
+    if isinstance(config.model.chart, schema.InjectiveVaeChart):
+        decoder = train_decoder(config.model.chart, config.vae, data, geometry, config.seed, run)
+        seen = encoded(data, decoder)
+        place = Geometry.of(seen)
+    field = models.build(models.of_codes(config.model), place)
+    objective = _objective(config, seen, place)
+    history = fit(field, objective, _schedule(config), run.checkpoint, run.log_series)
+    if decoder is not None:
+        field = decoded(decoder, field)
 
-    skill = Skill(field, config.model, geometry, channels, train_demos, test_demos)
+    skill = Skill(field, config.model, geometry, channels, train_demos, test_demos, coordinates)
     if conditioning is None:
         models.save(run.folder / "model.pt", skill)
         certificate = certify(field, data.all_states)
@@ -80,10 +102,20 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
         conditional_models.save(run.folder / "model.pt", conditional)
         certificate = _certify_conditions(conditional, selected, shown)
     write_json(run.folder / "certificate.json", certificate.as_dict())
+    write_json(run.folder / "training.json", {"returns": [one.as_dict() for one in history.returns]})
     curves = pd.DataFrame(history.rows)
     with atomic(run.folder / "training.csv") as temporary:
         curves.to_csv(temporary, index=False)
     save_training_figure(curves, run.folder / "figures")
+
+
+def _pose_coordinates(config: TrainConfig, demonstrations: Demonstrations) -> PoseCoordinates | None:
+    if config.space is None:
+        return None
+    if config.selection.state_channels is not None:
+        raise InvalidSetting("dataset.state_channels", config.selection.state_channels, "null beside `space`")
+    group: Group = "SO3" if config.space is schema.PoseSpace.R3xSO3 else "S3"
+    return fit_pose_coordinates(demonstrations, group, config.pose.cover.value, config.pose.lever_m_per_rad)
 
 
 def _conditions(demonstrations: Demonstrations) -> np.ndarray:
@@ -91,14 +123,13 @@ def _conditions(demonstrations: Demonstrations) -> np.ndarray:
 
 
 def _conditioning(model: ModelConfig, demonstrations: Demonstrations, data: TrainingSet) -> Conditioning:
-    ends = torch.stack([states[-1] for states in data.states]).double().numpy()
     return Conditioning.fit(
         demonstrations.condition_names,
         condition_names(demonstrations),
         _conditions(demonstrations),
-        ends,
-        # the thesis' field learns of the target by its networks alone
-        follows_goal=not isinstance(model.field, schema.LineIntegralField),
+        data,
+        # the thesis' field learns of the condition by its networks alone
+        moves_frame=not isinstance(model.field, schema.LineIntegralField),
     )
 
 
@@ -130,13 +161,11 @@ def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Ob
             raise TypeError(f"no objective for {type(unknown).__name__}")
 
 
-def _schedule(config: TrainConfig, geometry: Geometry) -> Schedule:
-    """The weights under a condition are a sum, which moves farther in a step than each of its terms."""
+def _schedule(config: TrainConfig) -> Schedule:
     training = config.training
-    slower = (1 + geometry.context) ** 0.5
     return Schedule(
         training.steps,
-        training.learning_rate / slower,
+        training.learning_rate,
         training.ramp_steps,
         training.gradient_clip,
         training.checkpoint_every_steps,

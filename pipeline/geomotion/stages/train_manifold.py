@@ -108,4 +108,5 @@ def _document(fitted: FittedManifold) -> dict[str, object]:
         "unexplained_variance": fitted.health.unexplained,
         "folded_share": fitted.health.folded,
         "is_good": fitted.health.is_good,
+        "returns": [one.as_dict() for history in fitted.histories for one in history.returns],
     }

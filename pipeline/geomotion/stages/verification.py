@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from geomotion.config import EvaluationConfig
-from geomotion.dynamics.certificate import Claim
+from geomotion.dynamics.certificate import ON_MANIFOLD, Claim
 from geomotion.dynamics.charts import ComposedChart, IdentityChart
 from geomotion.dynamics.fields import ChartedField
 from geomotion.networks.line_integral_bounds import LineIntegralBounds, why_unbounded
@@ -72,7 +72,7 @@ class Attempt:
         return dict(certificate) | {
             "claim": Claim.verified_on_set.value,
             "rate_per_s": self.found.rate / self.field.time_unit_s,
-            "reason": REASON.format(cells=self.found.cells),
+            "reason": REASON.format(cells=self.found.cells) + ("" if self.field.is_onto else ON_MANIFOLD),
             "verified_set": self._corners(),
         }
 
@@ -124,7 +124,7 @@ def attempt(field: ChartedField, states: NDArray[np.float64], margin: float, cel
         return "evaluation.verify_cells is 0"
     if reason := why_unbounded(field.field):
         return reason
-    if field.dim > MOST_AXES:
+    if field.field.dim > MOST_AXES:
         return f"boxes of more than {MOST_AXES} dimensions have too many cells"
     dtype = next(field.parameters()).dtype
     latent = field.chart.to_latent(torch.as_tensor(states, dtype=dtype)).double().numpy()

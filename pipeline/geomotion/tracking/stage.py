@@ -2,13 +2,14 @@
 
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geomotion.interrupts import held_signals
+from geomotion.policy.ports import STATUS, Input, Output
 from geomotion.scores.score import Score
 from geomotion.tracking.artefacts import Artefacts
 
@@ -73,37 +74,42 @@ class StageRun:
         entity = Dataset(name=name, digest=digest[:36], source_type="code", source=source)
         self._client.log_inputs(self.run_id, [DatasetInput(entity, [InputTag("mlflow.data.context", "training")])])
 
-    def log_policy(self, path: Path, inputs: Mapping[str, int], register_as: str | None) -> None:
-        """Log an exported field as an MLflow model, and register it if it has a name.
+    def log_policy(
+        self, path: Path, inputs: Sequence[Input], outputs: Sequence[Output], register_as: str | None
+    ) -> None:
+        """Log an exported policy as an MLflow model, and register it if it has a name.
 
         Args:
             path: The ONNX file.
-            inputs: How wide each of its inputs is, the state first, whose width is that of the velocity.
+            inputs: What it takes; MLflow passes on those that have to be given.
+            outputs: What it gives.
             register_as: Name in the registry.
         """
         import mlflow
         import numpy as np
         from mlflow.models import ModelSignature
-        from mlflow.types import ColSpec, Schema, TensorSpec
+        from mlflow.types import Schema, TensorSpec
 
-        def tensor(width: int, name: str | None = None) -> TensorSpec:
-            return TensorSpec(np.dtype(np.float32), (-1, width), name)
-
-        state, *others = inputs.values()
-        named: list[ColSpec | TensorSpec] = [tensor(state)]
-        if others:
-            named = [tensor(width, name) for name, width in inputs.items()]
+        needed = [TensorSpec(np.dtype(np.float32), (-1, one.width), one.name) for one in inputs if one.default is None]
+        given = [
+            TensorSpec(np.dtype(np.int64 if one.name == STATUS else np.float32), (-1, *_columns(one)), one.name)
+            for one in outputs
+        ]
         with held_signals(), mlflow.start_run(run_id=self.run_id), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             mlflow.pyfunc.log_model(
                 name="policy",
                 python_model=str(Path(__file__).parents[1] / "policy_model.py"),
                 artifacts={"policy": str(path)},
-                signature=ModelSignature(Schema(named), Schema([tensor(state)])),
+                signature=ModelSignature(Schema(list(needed)), Schema(list(given))),
                 pip_requirements=["onnxruntime", "numpy", "mlflow"],
                 registered_model_name=register_as,
             )
         self._client.update_run(self.run_id, status="RUNNING")
+
+
+def _columns(output: Output) -> tuple[int, ...]:
+    return () if output.width is None else (output.width,)
 
 
 StageFunction = Callable[[Any, Mapping[str, Artefacts], StageRun], None]

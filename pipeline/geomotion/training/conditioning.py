@@ -9,36 +9,57 @@ import torch
 from jaxtyping import Float
 
 from geomotion.errors import DatasetError, InvalidSetting
+from geomotion.training.barycentric import barycentric_coordinates
 from geomotion.training.data import Geometry, TrainingSet
 from geomotion.types import Tensor
 
-NEGLIGIBLE = 1e-6  # share of the largest variation of conditions below which a direction does not count
+
+@dataclass(frozen=True)
+class Frame:
+    """How the motions under one condition lie in the robot's coordinates: x = shift + stretch y, after slowdown t.
+
+    Attributes:
+        shift_m: Where the origin of y lies, shape (D,) [m].
+        stretch: By which lengths are larger than those of y.
+        slowdown: By which times are longer.
+    """
+
+    shift_m: Float[np.ndarray, " D"]
+    stretch: float
+    slowdown: float
 
 
 @dataclass(frozen=True)
 class Conditioning:
-    """How conditions enter a field, and where motions end under each.
+    """How conditions enter a field, and where, how large and how long motions are under each.
 
-    A condition c is seen as its code, an affine image without the directions in which no demonstrated condition
-    differs, so that seven labels out of seven are six numbers; codes of demonstrated conditions fill the unit ball.
+    A condition c is seen as its code: barycentric coordinates between as many demonstrated conditions, the corners, as
+    its directions need in which these differ. They are affine in c and add up to one. Labels are corners, all of them,
+    so that what is linear in the code has parameters of its own for each.
 
     Attributes:
         names: Names of the entries of a condition.
         demonstrated: Conditions of the training demonstrations by name.
-        mean: Of the demonstrated conditions, shape (K,).
-        directions: From differences to the mean to codes, shape (K, R).
-        goal: End of motions at the mean condition, shape (D,) [m].
-        goal_slopes: How it moves with the code, shape (D, R) [m].
-        follows_goal: Whether the field is learned in a frame that moves along with the goal.
+        offset: Code of the condition 0, shape (R,).
+        directions: From conditions to their part of the code, shape (K, R).
+        goals: Ends of motions at each corner, shape (R, D) [m].
+        size_m: Half of the longest side of the box around the motions under a condition, geometric mean [m].
+        duration_s: Their duration, geometric mean [s].
+        log_stretches: Logarithms of the size at each corner over the mean, shape (R,).
+        log_slowdowns: Logarithms of the duration at each corner over the mean, shape (R,).
+        moves_frame: Whether the field is learned in frames that follow goal, size and duration.
     """
 
     names: tuple[str, ...]
     demonstrated: Mapping[str, tuple[float, ...]]
-    mean: tuple[float, ...]
+    offset: tuple[float, ...]
     directions: tuple[tuple[float, ...], ...]
-    goal: tuple[float, ...]
-    goal_slopes: tuple[tuple[float, ...], ...]
-    follows_goal: bool
+    goals: tuple[tuple[float, ...], ...]
+    size_m: float
+    duration_s: float
+    log_stretches: tuple[float, ...]
+    log_slowdowns: tuple[float, ...]
+    moves_frame: bool
 
     @classmethod
     def fit(
@@ -46,34 +67,35 @@ class Conditioning:
         names: Sequence[str],
         demonstrated: Mapping[str, tuple[float, ...]],
         conditions: Float[np.ndarray, "demo K"],
-        ends: Float[np.ndarray, "demo D"],
-        follows_goal: bool,
+        data: TrainingSet,
+        moves_frame: bool,
     ) -> "Conditioning":
-        """Measure conditions and where their demonstrations end: x*(c), affine in c, by least squares.
+        """Measure conditions and motions under each: goals and logarithms affine in c, by least squares.
 
         Raises:
-            DatasetError: If the conditions do not differ.
+            DatasetError: If the conditions do not differ, or nothing moves under one of them.
         """
         distinct = np.array(list(demonstrated.values()))
-        mean, spread = distinct.mean(0), distinct.std(0)
-        if not (spread > 0).any():
-            raise DatasetError("conditions", f"all demonstrations have {distinct[0].tolist()}; expected different ones")
-        unit = np.divide(1.0, spread, out=np.zeros_like(spread), where=spread > 0)
-        _, sizes, axes = np.linalg.svd((distinct - mean) * unit, full_matrices=False)
-        directions = unit[:, None] * axes[sizes > NEGLIGIBLE * sizes[0]].T
-        directions = directions / np.linalg.norm((distinct - mean) @ directions, axis=1).max()
-        codes = (conditions - mean) @ directions
-        design = np.concatenate([np.ones((len(codes), 1)), codes], axis=1)
-        solution = np.linalg.lstsq(design, ends, rcond=None)[0]
+        offset, directions = barycentric_coordinates(distinct)
+        motions = [data.select(np.flatnonzero((conditions == one).all(1))) for one in distinct]
+        measured = [Geometry.of(motion) for motion in motions]
+        for name, one in zip(demonstrated, measured, strict=True):
+            if one.scale_m == 0:
+                raise DatasetError(name, "the demonstrations stay where they start; expected motion")
+        log_units = np.log([(one.scale_m, one.duration_s) for one in measured])
+        means = log_units.mean(0)
+        values = np.concatenate([log_units - means, [one.goal for one in measured]], axis=1)
+        at_corners = np.linalg.lstsq(offset + distinct @ directions, values, rcond=None)[0]
+        size_m, duration_s = np.exp(means)
         return cls(
-            tuple(names), dict(demonstrated), _tuple(mean), _tuple(directions), _tuple(solution[0]),
-            _tuple(solution[1:].T), follows_goal,
+            tuple(names), dict(demonstrated), _tuple(offset), _tuple(directions), _tuple(at_corners[:, 2:]),
+            float(size_m), float(duration_s), _tuple(at_corners[:, 0]), _tuple(at_corners[:, 1]), moves_frame,
         )  # fmt: skip
 
     @property
     def context(self) -> int:
         """R, entries of a code."""
-        return len(self.directions[0])
+        return len(self.offset)
 
     def checked(self, condition: object, key: str = "condition") -> tuple[float, ...]:
         """A condition of the right size.
@@ -93,16 +115,19 @@ class Conditioning:
 
     def codes(self, conditions: Float[np.ndarray, "*batch K"]) -> Float[np.ndarray, "*batch R"]:
         """Codes of conditions."""
-        return np.asarray((conditions - np.array(self.mean)) @ np.array(self.directions))
+        return np.asarray(np.array(self.offset) + conditions @ np.array(self.directions))
 
     def goal_at(self, condition: Float[np.ndarray, " K"]) -> Float[np.ndarray, " D"]:
         """x*(c) [m]."""
-        return np.asarray(np.array(self.goal) + np.array(self.goal_slopes) @ self.codes(condition))
+        return np.asarray(self.codes(condition) @ np.array(self.goals))
 
-    def shift_at(self, condition: Float[np.ndarray, " K"]) -> Float[np.ndarray, " D"]:
-        """How far the frame of the field is moved [m]."""
-        goal = np.array(self.goal)
-        return np.asarray(self.goal_at(condition) - goal if self.follows_goal else np.zeros_like(goal))
+    def frame_at(self, condition: Float[np.ndarray, " K"]) -> Frame:
+        """The frame in which the field of this condition is learned; without moving ones, that of the robot."""
+        if not self.moves_frame:
+            return Frame(np.zeros(len(self.goals[0])), 1.0, 1.0)
+        code = self.codes(condition)
+        stretch, slowdown = np.exp([code @ np.array(logs) for logs in (self.log_stretches, self.log_slowdowns)])
+        return Frame(self.goal_at(condition), float(stretch), float(slowdown))
 
     def document(self) -> dict[str, Any]:
         """Plain types."""
@@ -119,27 +144,38 @@ class Conditioning:
 def with_conditions(
     data: TrainingSet, conditions: Float[np.ndarray, "demo K"], conditioning: Conditioning
 ) -> tuple[TrainingSet, Geometry]:
-    """Demonstrations of (x, c): states relative to the moved frame, and codes as lengths that stand still.
+    """Demonstrations of (x, c): motions in the frames of their conditions, and codes as lengths that stand still.
 
-    A code of one is as long as half of the demonstrations' longest side, so that both fill the same interval once
-    they are scaled. The frame's centre is the goal where it follows the goal.
+    A code of one is as long as the unit to which states are scaled.
     """
-    shifts = [torch.tensor(conditioning.shift_at(condition), dtype=torch.float32) for condition in conditions]
-    relative = replace(data, states=tuple(states - shift for states, shift in zip(data.states, shifts, strict=True)))
+    relative = _in_frames(data, [conditioning.frame_at(condition) for condition in conditions])
     plain = Geometry.of(relative)
-    codes = torch.tensor(conditioning.codes(conditions) * plain.scale_m, dtype=torch.float32)
-    states = tuple(_beside(states, code) for states, code in zip(relative.states, codes, strict=True))
-    velocities = tuple(_beside(velocities, torch.zeros(conditioning.context)) for velocities in data.velocities)
+    if conditioning.moves_frame:
+        origin = (0.0,) * len(plain.goal)
+        plain = Geometry(origin, conditioning.size_m, plain.mean, origin, conditioning.duration_s)
     padding = (0.0,) * conditioning.context
     geometry = Geometry(
-        (plain.goal if conditioning.follows_goal else plain.centre) + padding,
+        plain.centre + padding,
         plain.scale_m,
         plain.mean + padding,
         plain.goal + padding,
         plain.duration_s,
         context=conditioning.context,
     )
-    return replace(data, states=states, velocities=velocities), geometry
+    codes = torch.tensor(conditioning.codes(conditions) * geometry.scale_m, dtype=torch.float32)
+    states = tuple(_beside(states, code) for states, code in zip(relative.states, codes, strict=True))
+    velocities = tuple(_beside(velocities, torch.zeros(conditioning.context)) for velocities in relative.velocities)
+    return replace(relative, states=states, velocities=velocities), geometry
+
+
+def _in_frames(data: TrainingSet, frames: Sequence[Frame]) -> TrainingSet:
+    """Each demonstration in the coordinates and times of its frame."""
+    each = list(zip(data.times, data.states, data.velocities, frames, strict=True))
+    return TrainingSet(
+        tuple(times / frame.slowdown for times, _, _, frame in each),
+        tuple((states - torch.tensor(frame.shift_m).to(states)) / frame.stretch for _, states, _, frame in each),
+        tuple(velocities * (frame.slowdown / frame.stretch) for _, _, velocities, frame in each),
+    )
 
 
 def _beside(states: Tensor, code: Tensor) -> Tensor:

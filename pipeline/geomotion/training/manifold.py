@@ -35,7 +35,7 @@ class PoseReconstruction:
         chosen = torch.randint(len(self.poses), (settings.batch_points,), generator=generator)
         poses, done = self.poses[chosen], self.progress[chosen]
         mean, log_variance = model.encode(poses, done)
-        z = _drawn(mean, log_variance, generator)
+        z = drawn(mean, log_variance, generator)
         decoded = model.decode(z)
         position, orientation = torch.split(poses, [model.position_dim, model.orientation_dim], dim=-1)
         density = antipodal_log_density if self.antipodal is Antipodal.mixture else log_density
@@ -47,7 +47,7 @@ class PoseReconstruction:
             "position": settings.position_weight * fit_x.mean(),
             "orientation": settings.orientation_weight * fit_q.mean(),
             "progress": fit_s.mean(),
-            "divergence": settings.divergence_at(progress) * _divergence(mean, log_variance).mean(),
+            "divergence": settings.divergence_at(progress) * divergence(mean, log_variance).mean(),
         }
 
 
@@ -74,7 +74,7 @@ class SpreadLikelihood:
         poses = self.poses[chosen]
         with torch.no_grad():
             mean, log_variance = model.encode(poses, self.progress[chosen])
-            z = _drawn(mean, log_variance, generator)
+            z = drawn(mean, log_variance, generator)
             decoded = model.decode(z)
         position, orientation = torch.split(poses, [model.position_dim, model.orientation_dim], dim=-1)
         precision = model.precision(z)
@@ -107,12 +107,12 @@ class JointReconstruction:
         chosen = torch.randint(len(self.joints), (settings.batch_points,), generator=generator)
         joints, done = self.joints[chosen], self.progress[chosen]
         mean, log_variance = model.encode(joints, done)
-        z = _drawn(mean, log_variance, generator)
+        z = drawn(mean, log_variance, generator)
         decoded, decoded_progress = model.reconstruct(z)
         losses = {
             "joints": settings.position_weight * _squares(decoded - joints, settings.fixed_std).mean(),
             "progress": _squares((decoded_progress - done)[:, None], settings.progress_std).mean(),
-            "divergence": settings.divergence_at(progress) * _divergence(mean, log_variance).mean(),
+            "divergence": settings.divergence_at(progress) * divergence(mean, log_variance).mean(),
         }
         if settings.volume_weight > 0:
             some = model.joints_rad(z[: settings.volume_points])
@@ -142,7 +142,7 @@ class JointSpreadLikelihood:
         joints = self.joints[chosen]
         with torch.no_grad():
             mean, log_variance = model.encode(joints, self.progress[chosen])
-            z = _drawn(mean, log_variance, generator)
+            z = drawn(mean, log_variance, generator)
             squares = (model.reconstruct(z)[0] - joints).square().sum(dim=-1)
         precision = model.precision(z)
         return {"std": (squares * precision.square() / 2 - joints.shape[-1] * precision.log()).mean()}
@@ -152,14 +152,14 @@ def _squares(missed: Float[Tensor, "point D"], std: float) -> Float[Tensor, " po
     return missed.square().sum(dim=-1) / (2 * std**2)
 
 
-def _drawn(
+def drawn(
     mean: Float[Tensor, "point d"], log_variance: Float[Tensor, "point d"], generator: torch.Generator
 ) -> Float[Tensor, "point d"]:
     """From the posterior."""
     return mean + torch.randn(mean.shape, generator=generator) * (log_variance / 2).exp()
 
 
-def _divergence(mean: Float[Tensor, "point d"], log_variance: Float[Tensor, "point d"]) -> Float[Tensor, " point"]:
+def divergence(mean: Float[Tensor, "point d"], log_variance: Float[Tensor, "point d"]) -> Float[Tensor, " point"]:
     """Of the posterior from the prior."""
     return (mean.square() + log_variance.exp() - log_variance - 1).sum(dim=-1) / 2
 

@@ -32,7 +32,7 @@ class VelocityReconstruction:
         self.velocities = data.all_velocities
         self.batch_points = min(settings.batch_points, len(self.states))
         self.speed_m_per_s = geometry.scale_m / geometry.duration_s
-        self.surroundings = Surroundings(data, settings.curl_margin)
+        self.surroundings = Surroundings(data, settings.curl_margin, geometry.context)
 
     def __call__(self, model: ChartedField, progress: float, generator: torch.Generator) -> Losses:
         chosen = torch.randint(len(self.states), (self.batch_points,), generator=generator)

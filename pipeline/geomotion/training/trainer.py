@@ -15,6 +15,7 @@ from tqdm import tqdm
 from geomotion.errors import CorruptArtefact, TrainingDiverged
 from geomotion.files import write_tensors
 from geomotion.interrupts import PendingInterrupt, postponed_interrupts
+from geomotion.training.recovery import Recovery, Return
 
 logger = logging.getLogger(__name__)
 
@@ -69,53 +70,73 @@ class Schedule:
 
 @dataclass
 class History:
-    """Logged losses: one row a logged step."""
+    """What a training went through.
+
+    Attributes:
+        rows: Logged losses, one row a logged step.
+        returns: Breakdowns that it was taken back from.
+    """
 
     rows: list[dict[str, float]] = field(default_factory=list)
+    returns: list[Return] = field(default_factory=list)
 
 
 def fit(model: AnyModel, objective: Objective[AnyModel], schedule: Schedule, checkpoint: Path, log: Log) -> History:
     """Train a model in place, continuing from `checkpoint` if there is one.
 
     A signal is obeyed between two steps, after a checkpoint: the continued training ends in the same
-    parameters as an uninterrupted one.
+    parameters as an uninterrupted one. A training that breaks down goes back to its last good parameters, see
+    :class:`Recovery`.
 
     Raises:
-        TrainingDiverged: If a loss or a parameter is not finite.
+        TrainingDiverged: If it breaks down again and again, or a parameter is not finite in the end.
         Interrupted: If a signal arrived.
         CorruptArtefact: If the checkpoint cannot be read.
     """
     optimiser = torch.optim.Adam(model.parameters(), schedule.learning_rate, fused=True)
-    start, history = _restore(checkpoint, model, optimiser)
+    recovery = Recovery(model, optimiser)
+    start, history = _restore(checkpoint, model, optimiser, recovery)
     if start > 0:
         logger.info("train: continues at step %d of %d", start, schedule.steps)
     model.train()
     with postponed_interrupts() as pending:
         for step in _progress(start, schedule.steps):
-            losses = _step(model, objective, optimiser, schedule, step)
-            if step % schedule.log_every_steps == 0 or step == schedule.steps - 1:
+            losses = _step(model, objective, optimiser, recovery, schedule, step)
+            if losses is not None and (step % schedule.log_every_steps == 0 or step == schedule.steps - 1):
                 history.rows.append(_record(step, losses, optimiser, log))
-            _checkpoint_if_due(checkpoint, step + 1, schedule, pending, model, optimiser, history)
+            _checkpoint_if_due(checkpoint, step + 1, schedule, pending, model, optimiser, recovery, history)
     if not all(parameter.isfinite().all() for parameter in model.parameters()):  # by the last step, whose loss was
         raise TrainingDiverged(schedule.steps, math.nan)
     model.eval()
+    history.returns = recovery.returns
     return history
 
 
 def _step(
-    model: AnyModel, objective: Objective[AnyModel], optimiser: torch.optim.Optimizer, schedule: Schedule, step: int
-) -> Losses:
+    model: AnyModel,
+    objective: Objective[AnyModel],
+    optimiser: torch.optim.Optimizer,
+    recovery: Recovery,
+    schedule: Schedule,
+    step: int,
+) -> Losses | None:
+    """Losses of one step; None where the training had broken down and was taken back instead."""
     progress = step / schedule.steps
     for group in optimiser.param_groups:
-        group["lr"] = schedule.learning_rate_at(step)
+        group["lr"] = schedule.learning_rate_at(step) * recovery.learning_rate_factor
     losses = objective(model, progress, torch.Generator().manual_seed(schedule.seed * 1_000_003 + step))
     total = torch.stack(list(losses.values())).sum()
-    if not torch.isfinite(total):
-        raise TrainingDiverged(step, float(total.detach()))
+    if recovery.is_broken(float(total.detach())):
+        recovery.go_back(step, float(total.detach()))
+        return None
     optimiser.zero_grad()
     total.backward()  # type: ignore[no-untyped-call]
-    nn.utils.clip_grad_norm_(model.parameters(), schedule.gradient_clip)
+    size = nn.utils.clip_grad_norm_(model.parameters(), schedule.gradient_clip)
+    if not size.isfinite():
+        recovery.go_back(step, float(size))
+        return None
     optimiser.step()
+    recovery.keep_if_due(step + 1)
     return losses
 
 
@@ -133,6 +154,7 @@ def _checkpoint_if_due(
     pending: PendingInterrupt,
     model: nn.Module,
     optimiser: torch.optim.Optimizer,
+    recovery: Recovery,
     history: History,
 ) -> None:
     if pending.signal_number is not None or (done % schedule.checkpoint_every_steps == 0 and done < schedule.steps):
@@ -140,19 +162,21 @@ def _checkpoint_if_due(
             "step": done,
             "model": model.state_dict(),
             "optimiser": optimiser.state_dict(),
+            "recovery": recovery.state(),
             "history": history.rows,
         }
         write_tensors(path, state)
     pending.raise_if_set()
 
 
-def _restore(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer) -> tuple[int, History]:
+def _restore(path: Path, model: nn.Module, optimiser: torch.optim.Optimizer, recovery: Recovery) -> tuple[int, History]:
     if not path.is_file():
         return 0, History()
     try:
         state = torch.load(path, weights_only=True)
         model.load_state_dict(state["model"])
         optimiser.load_state_dict(state["optimiser"])
+        recovery.load_state(state["recovery"])
         return int(state["step"]), History(state["history"])
     except Exception as error:  # torch reports damage by many types
         raise CorruptArtefact(path, "this checkpoint cannot be read") from error

@@ -7,6 +7,7 @@ import torch
 
 from geomotion.config import TrajectoryTraining
 from geomotion.dynamics.charts import AnchoredChart
+from geomotion.dynamics.embedded import EmbeddedField
 from geomotion.dynamics.fields import ChartedField, SolvableField
 from geomotion.training.data import Geometry, Surroundings, TrainingSet
 from geomotion.training.trainer import Losses
@@ -53,7 +54,8 @@ class TrajectoryReproduction:
     starts lie on mixtures of two similar demonstrations, x_i + λ (x_j - x_i), which stand for the repetitions that a
     person did not show, and a little beside them: without these the field learns the starts of the training set by
     heart. After a warm-up, the nearest-point term compares whole curves, which lets the shape count more than the
-    timing. Beside the demonstrations, where nothing is known, haste is held against the field.
+    timing. Beside the demonstrations, where nothing is known, haste is held against the field. Where the skill has
+    fewer coordinates than the state, shown states have to be near what these coordinates say of them.
 
     Args:
         data: Demonstrations.
@@ -72,9 +74,10 @@ class TrajectoryReproduction:
         self.states = data.all_states
         self.times = torch.cat(data.times) / geometry.duration_s
         self.start_noise = torch.full((self.states.shape[1],), settings.start_noise)
+        self.codes = max(1, geometry.context)  # shares of the chart's parameters, of which each motion has one
         self.start_noise[len(self.start_noise) - geometry.context :] = 0  # a condition is known exactly
         self.velocities = data.all_velocities
-        self.surroundings = Surroundings(data, settings.surroundings)
+        self.surroundings = Surroundings(data, settings.surroundings, geometry.context)
         self.top_speed = self.velocities.norm(dim=-1).max()
         self.mean_square_speed = self.velocities.square().sum(-1).mean()
 
@@ -84,7 +87,6 @@ class TrajectoryReproduction:
         mixed = self._mix(generator)
         chosen = torch.randint(len(self.states), (settings.velocity_points,), generator=generator)
         samples = self._samples(mixed, generator)
-        elapsed = model.progress(samples.times) - model.progress(samples.begin)[..., None]
         followed, first = self._followed(mixed, generator)
         curve_times = self._curve_times(followed, generator)
 
@@ -99,12 +101,18 @@ class TrajectoryReproduction:
         image = z[-1]
         velocities = push_forward(field(z - image))[: len(known)] / model.time_unit_s
         latent_starts = (z[len(known) : -1] - image).view(samples.starts.shape)
-        paths = [field.solve(latent_starts, elapsed).flatten(0, 2)]
+        # a condition is the same in scaled and in latent coordinates, up to where they begin
+        paths = [model.flow(latent_starts, samples.times, model.law_at(samples.starts), samples.begin).flatten(0, 2)]
         if curve_term:
-            paths.append(field.solve(latent_starts[:, first], model.progress(curve_times)).flatten(0, 1))
+            law = model.law_at(followed.states[:, 0])
+            paths.append(model.flow(latent_starts[:, first], curve_times, law).flatten(0, 1))
+        count = sum(map(len, paths))
+        if isinstance(field, EmbeddedField):
+            paths.append(field.project(z[: len(chosen)] - image))
         x = self._from_metres(chart.chart.to_ambient(torch.cat(paths) + image))
 
-        predicted = velocities[: len(chosen)] * model.speed(self.times[chosen])[:, None]
+        speeds = model.law_at(self._from_metres(self.states[chosen])).speed(self.times[chosen])
+        predicted = velocities[: len(chosen)] * speeds[:, None]
         error = (predicted - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
         distance = (x[: len(paths[0])].view(samples.targets.shape) - samples.targets).square().sum(-1)
         equal_time = distance.mean()
@@ -112,14 +120,17 @@ class TrajectoryReproduction:
         size = torch.stack(squares).sum() if squares else torch.zeros(())  # the identity has no parameters
         losses = {
             "velocity": settings.velocity_weight * error,
-            "weights": settings.weight_penalty * size,
+            "weights": settings.weight_penalty * size / self.codes,
             "end": settings.end_weight * distance[..., -1].mean(),
         }
+        if len(x) > count:
+            apart = x[count:] - self._from_metres(self.states[chosen])
+            losses["projection"] = settings.projection_weight * apart.square().sum(-1).mean()
         if settings.haste_weight > 0:
             losses["haste"] = settings.haste_weight * self._haste(velocities[len(chosen) :])
         if not curve_term:
             return losses | {"equal_time": settings.equal_time_warm_up_weight * equal_time}
-        curve = x[len(paths[0]) :].view(*curve_times.shape, -1)
+        curve = x[len(paths[0]) : count].view(*curve_times.shape, -1)
         phase = int(torch.randint(self.curve_stride, (), generator=generator))
         return losses | {
             "equal_time": settings.equal_time_weight * equal_time,

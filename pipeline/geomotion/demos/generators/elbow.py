@@ -15,7 +15,6 @@ from geomotion.config import ElbowConfig, JointDataset, Overlap
 from geomotion.demos.demonstrations import Array, Demonstrations, Trajectory
 from geomotion.demos.generators.human import (
     FRAME,
-    LICENCE,
     Habits,
     Intent,
     Spread,
@@ -24,6 +23,7 @@ from geomotion.demos.generators.human import (
     repeat,
     wander,
 )
+from geomotion.demos.generators.provenance import generated
 from geomotion.errors import InvalidSetting
 from geomotion.robot.panda import JOINTS
 
@@ -54,7 +54,7 @@ def profile_rad(config: ElbowConfig, solution: int, points: int, variation: floa
     return np.asarray(config.swivel_rad + own * _apart(config.overlap, share) + departure)
 
 
-def lead_in_turn(config: JointDataset, intents: Sequence[Intent], habits: Habits, source: str) -> Demonstrations:
+def lead_in_turn(config: JointDataset, intents: Sequence[Intent], habits: Habits, what: str) -> Demonstrations:
     """Demonstrations of the simulated Panda in joint space: all solutions of the first intent, of the next, and again.
 
     ``joints_rad`` [rad] is where the arm was led; ``position_m`` [m] and ``orientation_wxyz`` are where that brings its
@@ -64,15 +64,12 @@ def lead_in_turn(config: JointDataset, intents: Sequence[Intent], habits: Habits
         InvalidSetting: If one leads out of the arm's reach, or the elbow to where joint limits forbid it to be.
     """
     solutions = config.elbow.solutions
-    return Demonstrations(
-        name=config.name,
-        trajectories=tuple(
-            _lead(intents[number // solutions % len(intents)], habits, config, number) for number in range(config.demos)
-        ),
+    return generated(
+        config,
+        (_lead(intents[number // solutions % len(intents)], habits, config, number) for number in range(config.demos)),
+        what,
         space="joint",
         frame=FRAME,
-        source=f"{source}; seed {config.seed}",
-        licence=LICENCE,
         steps=(led(config.elbow),),
         joint_names=JOINTS,
     )

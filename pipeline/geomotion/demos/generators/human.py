@@ -33,7 +33,6 @@ LEVER_M = 0.2  # turning by a radian takes as long as moving by this
 CURVATURE_FLOOR_PER_M = 3.0  # straighter parts are not passed faster
 FRAME = "base of the simulated Panda (franka_panda/panda.urdf of pybullet_data); poses of its grasp target"
 LED = "led the simulated arm along intended poses; joints_rad are derived from them by inverse kinematics"
-LICENCE = "MIT, as the program that made it"
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from geomotion.config import (
     FolderDataset,
     JCDataset,
     LasaDataset,
+    LasaPoseDataset,
     LettersDataset,
     PandaCircleJointDataset,
     PandaPouringDataset,
@@ -18,7 +19,7 @@ from geomotion.config import (
 )
 from geomotion.demos.demonstrations import Demonstrations
 from geomotion.demos.generators import jc, letters, panda_joint, panda_pouring, panda_reach, planar, straight_lines
-from geomotion.demos.readers import folder, lasa, robotasks9, robotasks9_joint
+from geomotion.demos.readers import folder, lasa, lasa_pose, robotasks9, robotasks9_joint
 
 __all__ = ["read"]
 
@@ -33,6 +34,8 @@ def read(config: DatasetConfig) -> Demonstrations:
     match config:
         case LasaDataset():
             return lasa.read(config)
+        case LasaPoseDataset():
+            return lasa_pose.read(config)
         case RoboTasks9JointDataset():
             return robotasks9_joint.read(config)
         case RoboTasks9Dataset():

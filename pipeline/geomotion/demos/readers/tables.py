@@ -8,7 +8,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from geomotion.demos.columns import DEMO_COLUMNS, TIME_COLUMNS, column_names
+from geomotion.demos.columns import DEMO_COLUMNS, SCALAR_LAST, TIME_COLUMNS, column_names
 from geomotion.demos.demonstrations import CHANNEL_UNITS, UNIT_AXES
 from geomotion.errors import DatasetError
 
@@ -120,6 +120,10 @@ def _split_axes(path: Path, name: str, values: NDArray[Any]) -> dict[str, NDArra
             path, f"{name} has shape {values.shape}; expected (time,), (time, axes) or (demo, time, axes)"
         )
     width = values.shape[1]
+    if name == SCALAR_LAST:
+        if width != 4:
+            raise DatasetError(path, f"{name} has {width} axes; expected x, y, z, w")
+        return {f"orientation_{axis}": values[:, number] for number, axis in enumerate("xyzw")}
     if name in UNIT_AXES and width != len(UNIT_AXES[name]):
         raise DatasetError(path, f"{name} has {width} axes; expected {', '.join(UNIT_AXES[name])}")
     axes = column_names(name, width) if name in CHANNEL_UNITS else [f"{name}_{axis}" for axis in range(width)]

@@ -10,6 +10,7 @@ HEADS = {  # by name of score
     "train.relative_velocity_error": "velocity error",
     "train.end_point_error": "end point",
     "goal.never_reached": "never reach the goal",
+    "equilibrium.end_distance": "equilibrium to end",
 }
 
 

@@ -15,8 +15,13 @@ BY_CONSTRUCTION = (
     "The guarantee concerns trajectories of the field in exact arithmetic and in the learned metric. It says nothing "
     "about how well the demonstrations are reproduced."
 )
+ON_MANIFOLD = (
+    "Motions begin at the projection of their start onto the decoder's manifold, which is a jump. A robot that follows "
+    "velocities from beside the manifold stays beside it: nothing brings it back, and nothing is proven."
+)
 BEYOND = {
     "by_construction": "follows from the claim alone",
+    "by_construction_on_manifold": "follows from the claim on the decoder's manifold, and is unknown beside it",
     "verified_on_set": "follows from the claim inside the verified box, and is unknown outside",
 }
 REGION = "Steps inside the region depend on the grid of starts, the duration and the margin of the hull."
@@ -38,6 +43,8 @@ def caveats(data: EvaluationArrays, claim: str, protocol: str) -> list[str]:
         found.append(f"Contraction was sampled {where}: {points}. What happens between and beyond them {beyond}.")
     if claim == "by_construction":
         found.append(BY_CONSTRUCTION)
+    if claim == "by_construction_on_manifold":
+        found.append(ON_MANIFOLD)
     if data.region is not None:
         found.append(REGION)
     return [*found, *ALWAYS]

@@ -5,6 +5,11 @@ from collections.abc import Mapping
 from geomotion.figures.arrays import EvaluationArrays
 from geomotion.figures.report.pictures import Captions, Picture
 
+FILM = (
+    "In closed loop on the simulated arm",
+    "The policy is asked anew in every control period. Blue: where it would go undisturbed. Red dots end where a force "
+    "pushes the arm, which yields to it; nothing but the policy brings it back.",
+)
 CAPTIONS: Captions = {
     "demonstrations": (
         "Demonstrations",
@@ -33,6 +38,25 @@ CAPTIONS: Captions = {
     "goal_starts": (
         "Starts that never reach the goal",
         "From crosses, the motion stops elsewhere, circles, diverges, or is too slow for the time allowed.",
+    ),
+    "closed_loop": (
+        "The policy on the simulated arm",
+        "Orange should come back to the dashed path after each push, red. Dotted are 25 mm and 10 mm beside the path.",
+    ),
+    "safety_motion": (
+        "Safety region",
+        "The latent plane of the skill. White is free, dark is unsafe: far from the data, or an obstacle (filled). "
+        "Green motions must not cross the solid line; red dots, where they end, should be on the star. Help along the "
+        "geodesic frees motions that modulation alone brings to rest.",
+    ),
+    "safety_distance": (
+        "From volume to distance",
+        "Where positions are in obstacles, where the volume of the metric is large, and the distance field that is "
+        "calibrated with it: unsafe where S falls below ρ, untouched where it is above ν.",
+    ),
+    "safety_switching": (
+        "Switching of the modulation",
+        "Across the border, a motion is slowed to nothing at ρ; along it, it is up to twice as fast, Eq. (6.6).",
     ),
     "training": (
         "Training",

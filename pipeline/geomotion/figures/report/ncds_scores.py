@@ -40,6 +40,23 @@ LABELS = {
     "bound_excess": "Largest excess over the proven bound / initial distance",
     "never_reached": "Starts that never reach the goal",
     "clearance": "Smallest distance to an obstacle",
+    "speed_at_goal": "Speed at the goal, where it should be zero",
+    "goal_distance": "Distance of the equilibrium to the goal",
+    "end_distance": "Distance of the equilibrium to where demonstrations end",
+    "back_within_25mm_share": "Back within 25 mm in 6 % of the duration",
+    "back_within_25mm": "Time until back within 25 mm",
+    "back_within_25mm_worst": "Time until back within 25 mm, worst",
+    "back_within_10mm_share": "Back within 10 mm in 25 % of the duration",
+    "back_within_10mm": "Time until back within 10 mm",
+    "back_within_10mm_worst": "Time until back within 10 mm, worst",
+    "left_at_end": "Left at the end",
+    "left_at_end_worst": "Left at the end, worst",
+    "left_at_end_equal_time": "Left at the end, at equal times",
+    "left_at_end_equal_time_worst": "Left at the end, at equal times, worst",
+    "peak_speed": "Highest speed / that of the undisturbed motion",
+    "peak_speed_worst": "Highest speed / that of the undisturbed motion, worst",
+    "peak_speed_share": "Speed at most 1.5 times that of the undisturbed motion",
+    "recovery_ratio": "Time to a fifth of the distance / what the rate promises",
 }
 FIELD = Subject("Reproduction of the demonstrations, from their own starts", REPRODUCTION, LABELS)
 

@@ -15,15 +15,18 @@ Certificate = Mapping[str, Any]
 
 HEADLINES = {
     "by_construction": "Contracting by construction",
+    "by_construction_on_manifold": "Contracting by construction, on the decoder's manifold alone",
     "verified_on_set": "Contracting on a verified set",
     "measured_only": "No guarantee: contraction is measured only",
 }
 HOLDS = {
     "by_construction": "Two motions come together from any two starts, whatever training found",
+    "by_construction_on_manifold": "Two motions come together from any two starts on the decoder's manifold",
     "verified_on_set": "Two motions come together as long as both stay inside a box around the demonstrations",
 }
 PLAIN = {
     "by_construction": "These are distances in the robot's own coordinates: a push is forgotten from its first moment.",
+    "by_construction_on_manifold": "A push off the manifold is carried along; nothing is claimed there.",
     "verified_on_set": "Outside the box nothing is proven, and neither is that motions stay inside.",
 }
 LEARNED = ", in a metric that was learned with the motion,"

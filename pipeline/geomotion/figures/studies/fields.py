@@ -1,7 +1,8 @@
 """Pictures of studies of planar fields (Fig. 5.2, 5.4-5.6, 5.9-5.13, 6.11, 6.12)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 
 import numpy as np
@@ -9,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from geomotion.figures.arrays import Array, EvaluationArrays, read_evaluation
+from geomotion.figures.arrays import Array, EvaluationArrays, Region, read_evaluation
 from geomotion.figures.eigenvalues import COLOURMAP, on_grid, robust_norm
 from geomotion.figures.motion import draw_demonstrations, draw_plane
 from geomotion.figures.region import draw_region
@@ -31,6 +32,12 @@ class Judged:
     cell: JudgedCell
     data: EvaluationArrays
 
+    @property
+    def region(self) -> Region:
+        """What rollouts from a grid did."""
+        assert self.data.region is not None  # cells without are left out
+        return self.data.region
+
 
 def _planar(cells: Sequence[JudgedCell]) -> list[Judged]:
     judged = [Judged(cell, read_evaluation(cell.folder / "evaluation.npz")) for cell in cells]
@@ -41,37 +48,23 @@ def _planar(cells: Sequence[JudgedCell]) -> list[Judged]:
 def motions(cells: Sequence[JudgedCell]) -> StudyFigure | None:
     """Fields with rollouts from demonstrations' starts and from corners."""
     judged = _planar(of_first_seed(cells))
-    if not judged:
-        return None
-    figure, panels = panel_grid([one.cell for one in judged], SIDE_MM)
-    for ax, one in zip(panels, judged, strict=True):
-        draw_plane(ax, one.data, grid_rollouts=CORNERS)
-        ax.label_outer()
-    arrays = [
-        {"starts": np.stack([item.rollout[0] for item in one.data.judged]), "ends": _ends(one.data)} for one in judged
-    ]
     caption = (
         "Black: demonstrations. Orange: rollouts from their starts, held-out ones dashed. Green: rollouts from corners "
         "around them. White star: goal. Grey: the field."
     )
-    return StudyFigure(figure, "Learned motion", caption, named_arrays([one.cell for one in judged], arrays))
+    arrays = [
+        {"starts": np.stack([item.rollout[0] for item in one.data.judged]), "ends": _ends(one.data)} for one in judged
+    ]
+    return _panels("Learned motion", caption, judged, arrays, partial(draw_plane, grid_rollouts=CORNERS))
 
 
 @paper_style()
 def regions(cells: Sequence[JudgedCell]) -> StudyFigure | None:
     """Rollouts from a grid, in and out of the region of the demonstrations."""
     judged = _planar(of_first_seed(cells))
-    if not judged:
-        return None
-    figure, panels = panel_grid([one.cell for one in judged], SIDE_MM)
-    for ax, one in zip(panels, judged, strict=True):
-        assert one.data.region is not None
-        draw_region(ax, one.data.region)
-        draw_demonstrations(ax, one.data.judged)
-        ax.label_outer()
-    arrays = [{"steps_inside": one.data.region.steps_inside} for one in judged if one.data.region is not None]
     caption = "Rollouts from an equidistant grid: strong where they are inside the convex hull of the demonstrations."
-    return StudyFigure(figure, "Rollouts from anywhere", caption, named_arrays([one.cell for one in judged], arrays))
+    arrays = [{"steps_inside": _steps(one)} for one in judged]
+    return _panels("Rollouts from anywhere", caption, judged, arrays, _draw_region)
 
 
 @paper_style()
@@ -161,6 +154,30 @@ def _eigenvalue_maps(cells: Sequence[JudgedCell], matrix: str, title: str) -> St
     return StudyFigure(figure, title, caption, named_arrays([one.cell for one, _ in found], arrays))
 
 
+def _panels(
+    title: str,
+    caption: str,
+    judged: Sequence[Judged],
+    arrays: Sequence[Mapping[str, Array]],
+    draw: Callable[[Axes, EvaluationArrays], object],
+) -> StudyFigure | None:
+    """A panel for each cell; None where there is none."""
+    if not judged:
+        return None
+    cells = [one.cell for one in judged]
+    figure, panels = panel_grid(cells, SIDE_MM)
+    for ax, one in zip(panels, judged, strict=True):
+        draw(ax, one.data)
+        ax.label_outer()
+    return StudyFigure(figure, title, caption, named_arrays(cells, arrays))
+
+
+def _draw_region(ax: Axes, data: EvaluationArrays) -> None:
+    assert data.region is not None
+    draw_region(ax, data.region)
+    draw_demonstrations(ax, data.judged)
+
+
 def _spectrum(data: EvaluationArrays, matrix: str) -> tuple[Array, Array] | None:
     grid = data.eigenvalues
     if grid is None or len(grid.shape) != 2:
@@ -170,8 +187,7 @@ def _spectrum(data: EvaluationArrays, matrix: str) -> tuple[Array, Array] | None
 
 
 def _steps(one: Judged) -> Array:
-    assert one.data.region is not None
-    return one.data.region.steps_inside.astype(np.float64)
+    return one.region.steps_inside.astype(np.float64)
 
 
 def _ends(data: EvaluationArrays) -> Array:

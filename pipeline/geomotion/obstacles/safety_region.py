@@ -1,0 +1,199 @@
+r"""Safe regions of a latent plane: where the volume of the metric is small.
+
+The volume 𝒱 = √det M grows away from the data and towards obstacles, so that S = α/𝒱 is a distance field: large where
+a motion is free, below ρ where it must not go. With several reasons to stay away, each has a volume and an α of its
+own, and
+
+.. math:: S = \Big(\sum_i (\mathcal V_i / \alpha_i)^4\Big)^{-1/4} \le \min_i \alpha_i / \mathcal V_i,
+
+which is at most ρ wherever one of them says so, and as smooth as the volumes are.
+
+Source: Thesis Sec. 6.3.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+from torch import nn
+
+from geomotion.errors import InvalidSetting, MissingData
+from geomotion.manifolds.grid import LatentGrid
+from geomotion.manifolds.grid_spline import GridSpline
+from geomotion.types import Float, Tensor
+
+SHARPNESS = 4  # of the minimum over reasons to stay away
+GUARD = 0.01  # of ρ, by which a motion stops before it: room for the error of a step
+DIRECTION_FLOOR = 1e-12  # a shorter gradient has no direction
+
+Points = Float[Tensor, "*batch 2"]
+Values = Float[Tensor, "*batch 1"]
+NodeValues = Float[np.ndarray, " node"]
+
+
+@dataclass(frozen=True)
+class Levels:
+    """How a distance S switches the modulation.
+
+    Attributes:
+        impenetrable: ρ, at which nothing gets nearer.
+        inactive: ν, from which on nothing is changed.
+        steepness: k of the sigmoid.
+
+    Raises:
+        InvalidSetting: Unless 0 < ρ < ν, and 0 < k.
+    """
+
+    impenetrable: float = 1.0
+    inactive: float = 10.0
+    steepness: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not (0 < self.impenetrable < self.inactive and self.steepness > 0):
+            found = (self.impenetrable, self.inactive, self.steepness)
+            raise InvalidSetting("safety.rho, nu, steepness", found, "0 < rho < nu, and a steepness above 0")
+
+    @property
+    def guarded(self) -> float:
+        """The distance at which a motion stops, a little more than ρ."""
+        return (1 + GUARD) * self.impenetrable
+
+    def switched(self, distance: Tensor, initial: float, end: float) -> Tensor:
+        r"""Ξ: `initial` up to ρ, `end` from ν on, and a sigmoid between them.
+
+        The sigmoid as printed is 1e-4 at ρ, where a motion would pass slowly. Here it is stretched such that it is
+        exactly `initial` up to ρ, or a hundredth of ρ before it, and `end` from ν on.
+
+        Source:
+            Thesis Eq. (6.6), (6.7).
+        """
+        half = self.steepness * (self.inactive - self.guarded) / 2
+        middle = (self.guarded + self.inactive) / 2
+        share = (torch.tanh(self.steepness / 2 * (distance - middle)) / math.tanh(half / 2) + 1) / 2
+        return initial + (end - initial) * torch.where(distance > self.guarded, share.clamp(0, 1), 0.0)
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One reason to stay away from a part of the latent plane.
+
+    Attributes:
+        name: What to call it.
+        volume: 𝒱 at the nodes; above zero.
+        scale: α.
+    """
+
+    name: str
+    volume: NodeValues
+    scale: float
+
+    @property
+    def closeness(self) -> NodeValues:
+        """1/S of this reason alone."""
+        return self.volume / self.scale
+
+
+def calibrated(name: str, volume: NodeValues, is_unsafe: Bool[np.ndarray, " node"], levels: Levels) -> Reason:
+    """The largest α such that S ≤ ρ at every unsafe node; the thesis chooses it by hand.
+
+    What is guaranteed is one-sided. That S > ν everywhere else, as the thesis asks, cannot be had with any α: between
+    ρ and ν there is the width over which the volume falls by ν/ρ.
+
+    Raises:
+        MissingData: If no node is unsafe: the obstacle is outside of what the manifold reaches, or between nodes.
+    """
+    if not is_unsafe.any():
+        raise MissingData(f"a latent node in {name}", "It does not stand in the way; leave it out, or refine the grid.")
+    return Reason(name, volume, levels.impenetrable * float(volume[is_unsafe].min()))
+
+
+def distance_on_grid(reasons: Sequence[Reason]) -> NodeValues:
+    """S at the nodes."""
+    closeness = np.stack([one.closeness for one in reasons])
+    largest = closeness.max(axis=0)
+    return np.asarray(1 / (largest * ((closeness / largest) ** SHARPNESS).sum(axis=0) ** (1 / SHARPNESS)))
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What points see of the region's border.
+
+    Attributes:
+        distance: S.
+        freedom: λ_n, zero where a motion stops and one from ν on; λ_τ is 2 - λ_n.
+        normal: n = ∇S/‖∇S‖, away from what is unsafe.
+        depth: How far it is to where a motion stops from a point beyond that, to first order; otherwise zero.
+        onward: Direction in which the way to the goal shrinks fastest; zero where there is none.
+    """
+
+    distance: Values
+    freedom: Values
+    normal: Points
+    depth: Values
+    onward: Points
+
+
+class SafetyRegion(nn.Module):
+    """{z : S(z) > ρ}, and the way to the goal in it.
+
+    Args:
+        grid: Planar; its border unsafe.
+        distance: S at its nodes.
+        way_to_goal: Length of the shortest way to the goal from each node; infinite where there is none.
+        levels: ρ, ν and k.
+
+    Raises:
+        InvalidSetting: If a node on the grid's border is safe.
+    """
+
+    def __init__(self, grid: LatentGrid, distance: NodeValues, way_to_goal: NodeValues, levels: Levels) -> None:
+        super().__init__()
+        border = np.ones(grid.shape, dtype=bool)
+        border[1:-1, 1:-1] = False
+        if (distance.reshape(grid.shape)[border] > levels.impenetrable).any():
+            raise InvalidSetting("safety.margin", "safe nodes on the border of the grid", "a wider margin")
+        self.levels = levels
+        self.maps = GridSpline(grid, np.stack([-np.log(distance), _everywhere(grid, way_to_goal)], axis=1))
+
+    def distance(self, points: Points) -> Float[Tensor, "*batch"]:
+        """S."""
+        return (-self._closeness(points)[0]).exp()
+
+    def is_safe(self, points: Points) -> Bool[Tensor, "*batch"]:
+        """Whether S > ρ."""
+        return self.distance(points) > self.levels.impenetrable
+
+    def sight(self, points: Points) -> Sight:
+        """Distance, normal, depth and the way onward."""
+        closeness, slope, way = self._closeness(points)
+        distance = (-closeness).exp()[..., None]
+        steepness = slope.norm(dim=-1, keepdim=True).clamp(min=DIRECTION_FLOOR)
+        beyond = closeness[..., None] + math.log(self.levels.guarded)
+        return Sight(
+            distance,
+            self.levels.switched(distance, 0.0, 1.0),
+            -slope / steepness,
+            beyond.clamp(min=0) / steepness,
+            -way / way.norm(dim=-1, keepdim=True).clamp(min=DIRECTION_FLOOR),
+        )
+
+    def _closeness(self, points: Points) -> tuple[Float[Tensor, "*batch"], Points, Points]:
+        """log 1/S and its gradient, also outside of the grid, and the gradient of the way to the goal."""
+        values, gradients = self.maps(points)
+        beyond = (points - self.maps.nearest(points)) / self.maps.cell
+        cells = beyond.norm(dim=-1)
+        outward = beyond / cells.clamp(min=DIRECTION_FLOOR)[..., None] / self.maps.cell
+        return values[..., 0] + cells, gradients[..., 0, :] + outward, gradients[..., 1, :]
+
+
+def _everywhere(grid: LatentGrid, way: NodeValues) -> NodeValues:
+    """Ways to the goal, smoothed over a cell, and from nodes without one: to the nearest node that has one and on."""
+    is_open = np.isfinite(way).reshape(grid.shape)
+    cells, nearest = distance_transform_edt(~is_open, return_indices=True)
+    known = way.reshape(grid.shape)[tuple(nearest)]
+    per_cell = known[is_open].max() / max(grid.shape)
+    return np.asarray(gaussian_filter(known + per_cell * cells, sigma=1.0, mode="nearest").ravel())

@@ -1,0 +1,166 @@
+"""What a control loop asks: a velocity for what it measures, and whether it can be trusted."""
+
+from collections.abc import Mapping
+from copy import deepcopy
+
+import torch
+from torch import nn
+
+from geomotion.conditional_models import ConditionalPolicy, ConditionalSkill
+from geomotion.demos.demonstrations import CHANNEL_UNITS
+from geomotion.dynamics.charts import ComposedChart
+from geomotion.dynamics.conditional import Standing
+from geomotion.dynamics.embedded import EmbeddedField
+from geomotion.dynamics.injective import DecoderChart
+from geomotion.models import Skill
+from geomotion.policy import ports
+from geomotion.policy.ports import Input, Output, Status
+from geomotion.policy.sphere import Avoidance, TensorSphere
+from geomotion.policy.training_range import TrainingRange
+from geomotion.types import Bool, State, Tensor, Velocity
+
+ROTATION_TOLERANCE = 0.1  # of a quaternion's length; measured ones are shortened to one within it
+
+
+class Policy(nn.Module):
+    """(state[, condition][, time][, obstacle][, k]) ↦ (velocity, status[, distance to the skill's manifold]).
+
+    States are what the robot measures: positions, joints, or positions with orientations, whose velocities are those of
+    the frame at rest. Of spheres told at run time, positions keep clear. In the group S³ the sign of a quaternion
+    counts: it has to follow the motion, which starts on the side of the mean orientation.
+
+    Args:
+        skill: Trained.
+        training_range: Where it was demonstrated.
+        avoidance: What a sphere in the way does.
+    """
+
+    def __init__(
+        self, skill: Skill | ConditionalSkill, training_range: TrainingRange, avoidance: Avoidance | None = None
+    ) -> None:
+        super().__init__()
+        plain = skill if isinstance(skill, Skill) else skill.augmented
+        self.conditional = None if isinstance(skill, Skill) else ConditionalPolicy(skill)
+        self.field = plain.field
+        self.pose = None if plain.pose is None else deepcopy(plain.pose).float()
+        self.training_range = training_range
+        self.avoidance = avoidance or Avoidance()
+        self.scale_m = plain.geometry.scale_m
+        self.dim = plain.field.dim - plain.geometry.context
+        self.channels = plain.state_channels
+        self.embedded, self.decoder = _embedded(plain), _decoder(plain)
+        self.inputs = tuple(self._inputs())
+        self.outputs = tuple(self._outputs())
+
+    @property
+    def has_manifold(self) -> bool:
+        """Whether the skill has fewer dimensions than its states."""
+        return self.embedded is not None or self.decoder is not None
+
+    def forward(self, *inputs: Tensor) -> tuple[Tensor, ...]:
+        """Values of :attr:`outputs` from those of :attr:`inputs`, in their order."""
+        given = dict(zip((one.name for one in self.inputs), inputs, strict=True))
+        x, is_rotation = self._state(given)
+        conditions = [given[ports.CONDITION]] if self.conditional is not None else []
+        z, velocity = self._velocity(x, given)
+        velocities = self._around_obstacle(x, velocity, given)
+        is_defined = torch.cat(velocities, -1).isfinite().all(-1) & is_rotation
+        is_inside = self.training_range.contains(x, conditions)
+        status = torch.where(is_defined, torch.where(is_inside, Status.ok, Status.outside), Status.undefined)
+        trusted = tuple(torch.where(is_defined[..., None], one, 0) for one in velocities)
+        offset = self._offset(x, z)
+        return (*trusted, status) if offset is None else (*trusted, status, offset.norm(dim=-1))
+
+    def _state(self, given: Mapping[str, Tensor]) -> tuple[State, Bool[Tensor, "*batch"]]:
+        """x, and whether its orientation is a rotation."""
+        if self.pose is None:
+            x = given[self.inputs[0].name]
+            return x, torch.ones_like(x[..., 0], dtype=torch.bool)
+        length = given[ports.ORIENTATION].norm(dim=-1, keepdim=True)
+        x = self.pose.to_vector(given[ports.POSITION], given[ports.ORIENTATION] / length)
+        return x, ((length - 1).abs() < ROTATION_TOLERANCE)[..., 0]
+
+    def _velocity(self, x: State, given: Mapping[str, Tensor]) -> tuple[Tensor, Velocity]:
+        """Latent state, with the code of a condition behind it, and ẋ."""
+        field = self.field
+        augmented, stretch, slowdown = x, torch.ones(()), torch.ones(())
+        if self.conditional is not None:
+            augmented = self.conditional.augmented(x, given[ports.CONDITION])
+            stretch, slowdown = self.conditional.units(given[ports.CONDITION])
+        z, push_forward = field.chart.linearise(augmented)
+        latent = self._latent_velocity(z, given)
+        if ports.ELAPSED in given:
+            latent = field.paced(z, latent, given[ports.ELAPSED] / (field.time_unit_s * slowdown))
+        return z, stretch / (field.time_unit_s * slowdown) * push_forward(latent)[..., : self.dim]
+
+    def _latent_velocity(self, z: Tensor, given: Mapping[str, Tensor]) -> Tensor:
+        """As the field has it, with the rate k that is asked for."""
+        if self.embedded is None:
+            velocity: Tensor = self.field.field(z)
+            return velocity
+        along = z[..., : self.embedded.skill_dim]
+        across = z[..., self.embedded.skill_dim : self.embedded.dim]
+        parts = [self.embedded.field(along), -given[ports.TRANSVERSE_RATE] * across]
+        return torch.cat([*parts, torch.zeros_like(z[..., self.embedded.dim :])], -1)
+
+    def _offset(self, x: State, z: Tensor) -> Tensor | None:
+        """z_e in the size of the demonstrations [m]; None for skills of all dimensions."""
+        if self.embedded is not None:
+            return self.scale_m * z[..., self.embedded.skill_dim : self.embedded.dim]
+        if self.decoder is not None:
+            return self.decoder.scaling.scale * self.decoder.split(x)[1]
+        return None
+
+    def _around_obstacle(self, x: State, velocity: Velocity, given: Mapping[str, Tensor]) -> tuple[Tensor, ...]:
+        """What is commanded: ẋ, or the velocity of the position and the angular one; the first clear of the ball."""
+        position, moving, turning = x, velocity, tuple[Tensor, ...]()
+        if self.pose is not None:
+            twist = self.pose.twist(x, velocity)
+            position, moving, turning = x[..., :3], twist.velocity, (twist.omega,)
+        if ports.OBSTACLE_RADIUS in given:
+            place = given[ports.OBSTACLE_CENTRE], given[ports.OBSTACLE_RADIUS], given[ports.OBSTACLE_VELOCITY]
+            moving = TensorSphere(*place).modulate(position, moving, self.avoidance)
+        return moving, *turning
+
+    def _inputs(self) -> list[Input]:
+        if self.pose is not None:
+            found = [Input(ports.POSITION, 3, "m"), Input(ports.ORIENTATION, 4, "1")]
+        else:
+            name = ports.JOINTS if self.channels == (ports.JOINTS,) else ports.STATE
+            found = [Input(name, self.dim, ", ".join(dict.fromkeys(CHANNEL_UNITS[one] for one in self.channels)))]
+        if self.conditional is not None:
+            found.append(Input(ports.CONDITION, self.conditional.condition_dim, "1"))
+        if self.field.time_law is not None:
+            found.append(Input(ports.ELAPSED, 1, "s"))
+        place = 3 if self.pose is not None else self.dim
+        if place > 1 and (self.pose is not None or self.channels == (ports.POSITION,)):
+            still = (0.0,) * place
+            found.append(Input(ports.OBSTACLE_CENTRE, place, "m", still))
+            found.append(Input(ports.OBSTACLE_RADIUS, 1, "m", (0.0,)))
+            found.append(Input(ports.OBSTACLE_VELOCITY, place, "m/s", still))
+        if self.embedded is not None:
+            rate = float(self.embedded.transverse_rate)
+            found.append(Input(ports.TRANSVERSE_RATE, 1, "1/mean duration", (rate,)))
+        return found
+
+    def _outputs(self) -> list[Output]:
+        if self.pose is not None:
+            found = [Output(ports.VELOCITY, 3, "m/s"), Output(ports.OMEGA, 3, "rad/s")]
+        elif self.channels == (ports.JOINTS,):
+            found = [Output(ports.JOINT_VELOCITY, self.dim, "rad/s")]
+        else:
+            units = self.inputs[0].unit.split(", ")
+            found = [Output(ports.VELOCITY, self.dim, ", ".join(f"{unit}/s" for unit in units))]
+        found.append(Output(ports.STATUS, None, "1"))
+        return found if not self.has_manifold else [*found, Output(ports.OFF_MANIFOLD, None, "m")]
+
+
+def _embedded(skill: Skill) -> EmbeddedField | None:
+    field = skill.field.field
+    inner = field.field if isinstance(field, Standing) else field
+    return inner if isinstance(inner, EmbeddedField) else None
+
+
+def _decoder(skill: Skill) -> DecoderChart | None:
+    chart = skill.field.chart
+    return chart.inner if isinstance(chart, ComposedChart) and isinstance(chart.inner, DecoderChart) else None

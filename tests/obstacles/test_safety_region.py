@@ -1,0 +1,185 @@
+"""Safety regions: what calibration guarantees, what modulation leaves of a field, and that motions stay inside."""
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from geomotion.errors import InvalidSetting, MissingData
+from geomotion.manifolds.grid import LatentGrid
+from geomotion.obstacles.safe_field import SafeField, against_geodesic, follow_safely
+from geomotion.obstacles.safety_region import Levels, Reason, SafetyRegion, calibrated, distance_on_grid
+
+LEVELS = Levels()
+GRID = LatentGrid(np.array([-2.0, -2.0]), np.array([2.0, 2.0]), 61)
+RADIUS = GRID.nodes[:, 0] ** 2 + GRID.nodes[:, 1] ** 2
+SUPPORT = calibrated("outside of a disc", np.exp(6 * RADIUS), RADIUS > 2, LEVELS)
+FROM_OBSTACLE = np.linalg.norm(GRID.nodes - [0.4, 0.0], axis=1)
+OBSTACLE = calibrated("a disc in the way", np.exp(-((FROM_OBSTACLE / 0.15) ** 2)), FROM_OBSTACLE < 0.2, LEVELS)
+FROM_BAR = np.hypot((GRID.nodes[:, 0] - 0.3) / 0.15, GRID.nodes[:, 1] / 0.5)
+BAR = calibrated("a bar across the way", np.exp(-(FROM_BAR**2)), FROM_BAR < 1.2, LEVELS)
+GOAL = torch.tensor([0.9, 0.0], dtype=torch.float64)
+
+
+class Funnel(nn.Module):
+    """Straight to the goal; coordinates beyond the plane decay."""
+
+    def __init__(self, dim: int = 2) -> None:
+        super().__init__()
+        self.dim = dim
+
+    def forward(self, z: torch.Tensor) -> torch.Tensor:
+        return nn.functional.pad(GOAL, (0, self.dim - 2)) - z
+
+
+class Flight(Funnel):
+    """Away from the goal, much faster than steps allow."""
+
+    def forward(self, z: torch.Tensor) -> torch.Tensor:
+        return -5 * super().forward(z)
+
+
+def region(*reasons: Reason) -> SafetyRegion:
+    """With the way to the goal straight, but past the obstacle by its upper side."""
+    distance = distance_on_grid(reasons)
+    turn = np.where(GRID.nodes[:, 0] < 0.4, np.abs(GRID.nodes[:, 1] - 0.95), 0.0)
+    way = np.linalg.norm(GRID.nodes - GOAL.numpy(), axis=1) + 2 * turn
+    return SafetyRegion(GRID, distance, np.where(distance > LEVELS.impenetrable, way, np.inf), LEVELS)
+
+
+def starts(safe: SafetyRegion, count: int = 100) -> torch.Tensor:
+    drawn = 4 * torch.rand(5 * count, 2, generator=torch.Generator().manual_seed(1), dtype=torch.float64) - 2
+    return drawn[safe.is_safe(drawn)][:count]
+
+
+# ---------------------------------------------------------------- levels and calibration
+def test_switching_is_exact_at_both_ends():
+    ends = torch.tensor([0.0, 1.0, LEVELS.guarded, 10.0, 1e6], dtype=torch.float64)
+    torch.testing.assert_close(
+        LEVELS.switched(ends, 0.0, 1.0), torch.tensor([0.0, 0, 0, 1, 1]).double(), rtol=0, atol=0
+    )
+    torch.testing.assert_close(
+        LEVELS.switched(ends, 2.0, 1.0), torch.tensor([2.0, 2, 2, 1, 1]).double(), rtol=0, atol=0
+    )
+
+
+def test_switching_is_the_printed_sigmoid_but_for_its_ends():
+    distance = torch.linspace(1, 10, 200, dtype=torch.float64)
+    printed = 1 / (1 + torch.exp(-2 * (distance - 5.5)))  # Eq. (6.6), (6.7)
+    torch.testing.assert_close(LEVELS.switched(distance, 0.0, 1.0), printed, atol=0.004, rtol=0)
+    assert (LEVELS.switched(distance, 0.0, 1.0).diff() >= 0).all()
+
+
+@pytest.mark.parametrize("wrong", [{"impenetrable": 0.0}, {"inactive": 1.0}, {"steepness": 0.0}])
+def test_levels_are_in_order(wrong):
+    with pytest.raises(InvalidSetting):
+        Levels(**wrong)
+
+
+def test_calibration_puts_all_unsafe_nodes_below_rho_and_the_farthest_at_it():
+    is_unsafe = RADIUS > 2
+    distance = 1 / SUPPORT.closeness
+    assert distance[is_unsafe].max() == pytest.approx(LEVELS.impenetrable)
+
+
+def test_calibration_does_not_depend_on_the_unit_of_volume():
+    scaled = calibrated("", 7.3 * np.exp(6 * RADIUS), RADIUS > 2, LEVELS)
+    np.testing.assert_allclose(scaled.closeness, SUPPORT.closeness)
+
+
+def test_what_is_nowhere_cannot_be_calibrated():
+    with pytest.raises(MissingData):
+        calibrated("nothing", RADIUS + 1, RADIUS < -1, LEVELS)
+
+
+def test_the_distance_of_several_reasons_is_at_most_that_of_each():
+    both = distance_on_grid([SUPPORT, OBSTACLE])
+    each = np.minimum(1 / SUPPORT.closeness, 1 / OBSTACLE.closeness)
+    assert (both <= each * (1 + 1e-12)).all()
+    assert (both >= each * 2 ** (-1 / 4) * (1 - 1e-12)).all()
+
+
+def test_the_border_of_the_grid_must_be_unsafe():
+    with pytest.raises(InvalidSetting):
+        SafetyRegion(GRID, np.full(len(RADIUS), 5.0), np.ones(len(RADIUS)), LEVELS)
+
+
+# ---------------------------------------------------------------- the modulated field
+def test_far_from_the_border_the_field_is_unchanged():
+    safe = region(SUPPORT, OBSTACLE)
+    points = starts(safe)
+    free = points[safe.distance(points) > LEVELS.inactive]
+    torch.testing.assert_close(SafeField(Funnel(), safe)(free), Funnel()(free))
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_nothing_crosses_the_border_but_inwards(direction):
+    safe = region(SUPPORT, OBSTACLE)
+    border = 1.2 * starts(safe)
+    for _ in range(5):  # Newton's method
+        sight = safe.sight(border)
+        border = border + sight.depth * sight.normal
+    border = border[(safe.distance(border) - LEVELS.guarded).abs() < 1e-6]
+    assert len(border) > 10
+    sight, wanted = safe.sight(border), direction * Funnel()(border)
+    velocity = SafeField(Funnel(), safe).steered(sight, wanted)
+    crossing, wanted_crossing = ((v * sight.normal).sum(-1) for v in (velocity, wanted))
+    assert (crossing > -1e-5).all()
+    is_leaving = wanted_crossing > 0.1
+    torch.testing.assert_close(crossing[is_leaving], wanted_crossing[is_leaving], atol=1e-4, rtol=0)
+
+
+def test_the_other_coordinates_do_not_feel_the_region():
+    safe = region(SUPPORT, OBSTACLE)
+    z = torch.cat([starts(safe), torch.ones(100, 3, dtype=torch.float64)], dim=1)
+    field = SafeField(Funnel(5), safe)
+    torch.testing.assert_close(field(z)[:, 2:], -z[:, 2:])
+    torch.testing.assert_close(field(z)[:, :2], SafeField(Funnel(), safe)(z[:, :2]))
+
+
+# ---------------------------------------------------------------- rollouts
+def test_motions_stay_in_the_region_and_get_to_the_goal():
+    safe = region(SUPPORT, OBSTACLE)
+    states, waited = follow_safely(SafeField(Funnel(), safe), starts(safe), torch.linspace(0, 8, 301).double())
+    assert safe.is_safe(states).all()
+    assert waited == 0
+    assert ((states[:, -1] - GOAL).norm(dim=1) < 0.02).all()
+
+
+def test_only_help_gets_a_motion_past_an_obstacle_in_front_of_which_the_field_comes_together():
+    safe = region(SUPPORT, BAR)
+    head_on = torch.tensor([[-0.5, 0.1]], dtype=torch.float64)
+    times = torch.linspace(0, 10, 301).double()
+    stopped, _ = follow_safely(SafeField(Funnel(), safe, onward=None), head_on, times)
+    helped, _ = follow_safely(SafeField(Funnel(), safe), head_on, times)
+    misled, _ = follow_safely(SafeField(Funnel(), safe, onward=against_geodesic), head_on, times)
+    assert stopped[0, -1, 0] < 0.3
+    assert helped[0, :, 1].max() > 0.6  # by the upper side, which the way to the goal takes
+    assert (helped[0, -1] - GOAL).norm() < 0.02
+    assert misled[0, :, 1].max() < 0.2
+
+
+def test_starts_outside_come_in():
+    safe = region(SUPPORT, OBSTACLE)
+    outside = torch.tensor([[1.6, 0.3], [-1.7, 1.9], [-3.0, 0.0], [0.45, 0.05]], dtype=torch.float64)
+    assert not safe.is_safe(outside).any()
+    states, _ = follow_safely(SafeField(Funnel(), safe), outside, torch.linspace(0, 1, 101).double())
+    assert safe.is_safe(states[:, -1]).all()
+
+
+def test_large_steps_are_halved_and_never_jump_over_what_is_unsafe():
+    safe = region(SUPPORT, OBSTACLE)
+    fast = SafeField(Flight(), safe, onward=None)
+    states, waited = follow_safely(fast, starts(safe, 20), torch.linspace(0, 0.6, 3).double())
+    assert safe.is_safe(states).all()
+    assert waited == 0
+
+
+def test_a_motion_cannot_tunnel_through_a_wall():
+    wall = calibrated(
+        "a wall", np.exp(-(((GRID.nodes[:, 0] - 0.3) / 0.1) ** 2)), np.abs(GRID.nodes[:, 0] - 0.3) < 0.1, LEVELS
+    )
+    safe = region(SUPPORT, wall)
+    before = starts(safe)[starts(safe)[:, 0] < 0.3]
+    states, _ = follow_safely(SafeField(Funnel(), safe), before, torch.linspace(0, 5, 26).double())
+    assert (states[..., 0] < 0.3).all()
