@@ -138,9 +138,13 @@ def _distances(model: ChartedField, x: Tensor, pace: Tensor, substeps: int) -> t
     else:
         states = rollout(Paced(model, both), x, _progress(), substeps=substeps).states
     latent = model.chart.to_latent(states)
-    stretch = field_jacobian(model.chart.to_latent, states.flatten(0, 1)).norm(dim=(-2, -1)).view(states.shape[:2])
+    jacobian = field_jacobian(model.chart.to_latent, states.flatten(0, 1))
+    stretch, back = (
+        matrix.norm(dim=(-2, -1)).view(states.shape[:2]) for matrix in (jacobian, torch.linalg.inv(jacobian))
+    )
     first, second = latent.view(2, len(pace), *latent.shape[1:])
-    size = latent.norm(dim=-1) + stretch * states.norm(dim=-1)
+    # what rounding does to latent states goes through ψ⁻¹ and back, which a linear field's closed form does once each
+    size = latent.norm(dim=-1) * (1 + stretch * back) + stretch * states.norm(dim=-1)
     return (first - second).norm(dim=-1), size.view(2, len(pace), -1).sum(0)
 
 

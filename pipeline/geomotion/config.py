@@ -977,6 +977,10 @@ class TrajectoryTraining(TrainingConfig):
         _require(self.starts >= 2, "training.starts", self.starts, "2 or more")
         _require(self.curve_points >= 2, "training.curve_points", self.curve_points, "2 or more")
         for name in (
+            "equal_time_warm_up_weight",
+            "equal_time_weight",
+            "nearest_point_weight",
+            "nearest_point_mean_weight",
             "end_weight",
             "projection_weight",
             "velocity_weight",
@@ -1290,7 +1294,7 @@ class RiemannianSafety(SafetyConfig):
         _require_positive(
             "safety", self, "starts", "rho", "steepness", "density_bandwidth", "density_power", "obstacle_gain"
         )
-        _require(self.nu > self.rho, "safety.nu", self.nu, f"more than safety.rho={self.rho}")
+        _require(self.nu > 1.01 * self.rho, "safety.nu", self.nu, f"more than 1.01 safety.rho={self.rho}")
         share = self.support_quantile
         _require(0 < share <= 1, "safety.support_quantile", share, "a share above 0, at most 1")
         _require(self.margin_m >= 0, "safety.margin_m", self.margin_m, "0 or more")

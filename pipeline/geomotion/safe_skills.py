@@ -168,6 +168,8 @@ def _region(
     distance = distance_on_grid(reasons)
     is_safe: Bool[np.ndarray, " node"] = distance > levels.impenetrable
     if not is_safe[goal_node]:
+        if len(reasons) == 1:
+            raise InvalidSetting("safety.nu", levels.inactive, "more: the goal is outside of the support of the data")
         raise InvalidSetting("obstacle", "over the goal", "one that leaves the goal free, or a smaller safety.margin_m")
     graph.close(~is_safe)
     way = graph.costs_from(goal_node)

@@ -70,7 +70,7 @@ def test_switching_is_the_printed_sigmoid_but_for_its_ends():
     assert (LEVELS.switched(distance, 0.0, 1.0).diff() >= 0).all()
 
 
-@pytest.mark.parametrize("wrong", [{"impenetrable": 0.0}, {"inactive": 1.0}, {"steepness": 0.0}])
+@pytest.mark.parametrize("wrong", [{"impenetrable": 0.0}, {"inactive": 1.0}, {"inactive": 1.005}, {"steepness": 0.0}])
 def test_levels_are_in_order(wrong):
     with pytest.raises(InvalidSetting):
         Levels(**wrong)

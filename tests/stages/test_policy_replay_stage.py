@@ -137,6 +137,11 @@ def test_a_start_out_of_reach_is_said(replayed):
             replace(QUIET, goal_changes=[schema.GoalChangeConfig(time_s=0.1, shift_m=[0.0, 0.0, 0.1])]),
             "lie in space",
         ),
+        (
+            "joints_rad",
+            replace(QUIET, pushes=[schema.PushConfig(time_s=100.0, force_n=[1.0, 0.0, 0.0])]),
+            "of the motion",
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused(replayed, kind, replay, expected):

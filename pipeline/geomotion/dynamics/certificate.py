@@ -31,7 +31,7 @@ NOT_A_JACOBIAN = (
 )
 ON_MANIFOLD = (
     " This holds on the manifold of the decoder, which is a diffeomorphism from the codes z to it. Beside the manifold "
-    "nothing is claimed: a state there moves as its projection does, and its offset does not decay."
+    "nothing is claimed: a state there moves as its projection does, and nothing brings it back."
 )
 UNCONSTRAINED = (
     "Nothing in this network keeps the symmetric part of its Jacobian negative. Whether it contracts can only be "
@@ -142,9 +142,12 @@ def decay_over_duration(model: ChartedField) -> float:
 def _about_time(model: ChartedField) -> str:
     if model.time_law is None:
         return ""
+    own_clock = ""
+    if model.transverse_law is not None:
+        own_clock = f"; beside the skill, a clock of its own does, {model.transverse_law.slowest():.2g} at the least"
     return (
-        f" Its time law multiplies velocities by a positive number, {model.slowest:.2g} at the least, which the rate "
-        f"accounts for; over the mean duration of {model.time_unit_s:.3g} s distances fall by "
+        f" Its time law multiplies velocities by a positive number, {model.slowest:.2g} at the least{own_clock}. The "
+        f"rate accounts for this; over the mean duration of {model.time_unit_s:.3g} s distances fall by "
         f"e^-{decay_over_duration(model):.3g}."
     )
 

@@ -129,7 +129,7 @@ class ChartedField(nn.Module):
         z, push_forward = self.chart.linearise(x)
         latent = self.field(z)
         if elapsed_s is not None:
-            latent = self.paced(z, latent, elapsed_s / self.time_unit_s)
+            latent = self.paced(latent, elapsed_s / self.time_unit_s, self.law_at(z))
         velocity: Velocity = push_forward(latent) / self.time_unit_s
         return velocity
 
@@ -138,9 +138,15 @@ class ChartedField(nn.Module):
         velocity: Velocity = self(x, elapsed_s)
         return velocity
 
-    def paced(self, z: State, latent: Velocity, times: Float[Tensor, "*#batch 1"]) -> Velocity:
-        """Latent velocities, as :attr:`field` gives them, at times since the start of the motion, in units of T."""
-        speed = self.law_at(z).speed(times)
+    def paced(self, latent: Velocity, times: Float[Tensor, "*#batch 1"], law: TimeLaw) -> Velocity:
+        """Latent velocities at times since the start of the motion.
+
+        Args:
+            latent: As :attr:`field` gives them.
+            times: In units of T.
+            law: θ, of :meth:`law_at`.
+        """
+        speed = law.speed(times)
         if self.transverse_law is None:
             return speed * latent
         assert isinstance(self.field, SkillField)

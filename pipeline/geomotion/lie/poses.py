@@ -12,7 +12,6 @@ from geomotion.lie.rotations import (
     inverse,
     product,
     quaternion,
-    rotation_rate,
     rotation_vector,
 )
 from geomotion.types import Float, State, Tensor, Velocity
@@ -85,10 +84,6 @@ class PoseCoordinates(nn.Module):
         if self.group == "SO3":
             turned = torch.where(turned[..., :1] < 0, -turned, turned)
         return rotation_vector(turned)
-
-    def omega_to_rate(self, orientation: Orientations, omega: Positions) -> Positions:
-        """ṙ of the rotation vector that turns at ω [rad/s]."""
-        return rotation_rate(self.turned_from_reference(orientation), omega)
 
     def document(self) -> dict[str, Any]:
         """Everything that it takes to make it again, as JSON types."""

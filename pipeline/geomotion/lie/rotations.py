@@ -62,18 +62,6 @@ def angular_velocity(rotation: RotationVector, rate: RotationVector) -> Rotation
     return omega
 
 
-def rotation_rate(rotation: RotationVector, omega: RotationVector) -> RotationVector:
-    r"""ṙ of a rotation vector whose rotation turns at ω: the inverse of :func:`angular_velocity`, below 2π.
-
-    .. math:: \dot r = \omega - \tfrac12\, r\times\omega
-        + \tfrac{1}{\theta^2}\left(1-\tfrac\theta2\cot\tfrac\theta2\right) r\times(r\times\omega)
-    """
-    angle = rotation.norm(dim=-1, keepdim=True)
-    once = torch.linalg.cross(rotation, omega)
-    rate: Tensor = omega - once / 2 + _cotangent_rest(angle) * torch.linalg.cross(rotation, once)
-    return rate
-
-
 def mean_quaternion(quaternions: Float[Tensor, "point 4"]) -> Float[Tensor, " 4"]:
     """The rotation with the least mean squared sine of half the angle to all; the sign of each does not matter.
 
@@ -104,11 +92,3 @@ def _sine_rest(angle: Tensor) -> Tensor:
     square = angle.square()
     safe = torch.where(angle < SMALL, 1, angle)
     return torch.where(angle < SMALL, 1 / 6 - square / 120, (safe - safe.sin()) / safe.pow(3))
-
-
-def _cotangent_rest(angle: Tensor) -> Tensor:
-    """(1 - a/2 cot(a/2))/a²."""
-    square = angle.square()
-    safe = torch.where(angle < SMALL, 1, angle)
-    half = safe / 2
-    return torch.where(angle < SMALL, 1 / 12 + square / 720, (1 - half * half.cos() / half.sin()) / safe.square())

@@ -45,7 +45,7 @@ class Levels:
         steepness: k of the sigmoid.
 
     Raises:
-        InvalidSetting: Unless 0 < ρ < ν, and 0 < k.
+        InvalidSetting: Unless 0 < 1.01 ρ < ν, and 0 < k.
     """
 
     impenetrable: float = 1.0
@@ -53,9 +53,10 @@ class Levels:
     steepness: float = 2.0
 
     def __post_init__(self) -> None:
-        if not (0 < self.impenetrable < self.inactive and self.steepness > 0):
+        if not (self.impenetrable > 0 and self.guarded < self.inactive and self.steepness > 0):
             found = (self.impenetrable, self.inactive, self.steepness)
-            raise InvalidSetting("safety.rho, nu, steepness", found, "0 < rho < nu, and a steepness above 0")
+            expected = f"0 < {1 + GUARD:g} rho < nu, and a steepness above 0"
+            raise InvalidSetting("safety.rho, nu, steepness", found, expected)
 
     @property
     def guarded(self) -> float:
@@ -83,7 +84,7 @@ class Reason:
 
     Attributes:
         name: What to call it.
-        volume: 𝒱 at the nodes; above zero.
+        volume: 𝒱 at the nodes, at least zero.
         scale: α.
     """
 
@@ -155,7 +156,8 @@ class SafetyRegion(nn.Module):
         border = np.ones(grid.shape, dtype=bool)
         border[1:-1, 1:-1] = False
         if (distance.reshape(grid.shape)[border] > levels.impenetrable).any():
-            raise InvalidSetting("safety.margin", "safe nodes on the border of the grid", "a wider margin")
+            expected = "less, so that what is safe ends before the border of the latent grid does"
+            raise InvalidSetting("safety.nu", levels.inactive, expected)
         self.levels = levels
         self.maps = GridSpline(grid, np.stack([-np.log(distance), _everywhere(grid, way_to_goal)], axis=1))
 

@@ -90,7 +90,7 @@ class Policy(nn.Module):
         z, push_forward = field.chart.linearise(augmented)
         latent = self._latent_velocity(z, given)
         if ports.ELAPSED in given:
-            latent = field.paced(z, latent, given[ports.ELAPSED] / (field.time_unit_s * slowdown))
+            latent = field.paced(latent, given[ports.ELAPSED] / (field.time_unit_s * slowdown), field.law_at(z))
         return z, stretch / (field.time_unit_s * slowdown) * push_forward(latent)[..., : self.dim]
 
     def _latent_velocity(self, z: Tensor, given: Mapping[str, Tensor]) -> Tensor:

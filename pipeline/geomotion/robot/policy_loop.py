@@ -94,6 +94,7 @@ class PolicyLoop:
         arm, recorder = self.scene.arm, Recorder(self.scene, self.motions, self.film)
         resolve = ResolvedRate(arm.chain, arm.limits, start_rad)
         self.scene.set_joints(start_rad)
+        self._velocities, self._torques, self._speeds = [], [], []
         velocity, is_cut_short, thinking_s = np.zeros_like(start_rad), [], []
         for period in range(round(duration_s * self.rate_hz)):
             time_s = period * period_s

@@ -10,6 +10,7 @@ import torch
 
 from geomotion.conditional_models import ConditionalSkill
 from geomotion.config import ObstacleConfig, RolloutConfig, SeveralObstacles, SolidObstacle, SolverConfig
+from geomotion.dynamics.embedded import EmbeddedField
 from geomotion.dynamics.injective import rollout_on_manifold
 from geomotion.dynamics.linear import LinearField
 from geomotion.dynamics.potential import PotentialField
@@ -194,7 +195,7 @@ def _change(phase: Phase, states: Float[Tensor, "time D"], times: Times) -> dict
         "condition": list(phase.condition),
         "goal_m": list(phase.skill.geometry.goal),
     }
-    if phase.field is not None or not isinstance(field.field, LinearField | PotentialField):
+    if phase.field is not None or not isinstance(field.field, LinearField | PotentialField | EmbeddedField):
         return change
     z = field.chart.to_latent(states[[0, -1]])
     progress = field.law_at(z).progress((times[-1] - times[0]) / field.time_unit_s)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from geomotion import config as schema
+from geomotion.errors import InvalidSetting
 from geomotion.obstacles.position_part import SPACE
 from geomotion.robot import panda
 from geomotion.robot.arm import Arm
@@ -23,9 +24,18 @@ Disturbances = Sequence[Push | Displacement]
 
 
 def disturbances(config: schema.ReplayConfig, begins: Beginning, alone: Undisturbed) -> Disturbances:
-    """The pushes that are asked for, in the order in which they begin."""
+    """The pushes that are asked for, in the order in which they begin; by default one, if the motion lasts as long.
+
+    Raises:
+        InvalidSetting: If one would begin after the motion.
+    """
+    duration_s = float(alone.time_s[-1])
     if config.pushes is None:
-        return [_across(alone, PUSH_AT * begins.duration_s, config.damping_n_s_per_m)]
+        time_s = PUSH_AT * begins.duration_s
+        return [_across(alone, time_s, config.damping_n_s_per_m)] if time_s < duration_s else []
+    for one in config.pushes:
+        if one.time_s >= duration_s:
+            raise InvalidSetting("replay.pushes.time_s", one.time_s, f"less than the {duration_s:.3g} s of the motion")
     return sorted((_push(one) for one in config.pushes), key=lambda one: one.time_s)
 
 

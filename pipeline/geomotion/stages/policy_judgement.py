@@ -36,7 +36,7 @@ class Judgement:
         recoveries: From each disturbance.
         end_error_m: Distance of the position to the goal in the end; None of joints.
         end_error_rad: The same of the orientation, or of the joint that is farthest; None of positions.
-        peak_speed_ratio: Highest speed of the tip, but for while it is pushed, of the highest without disturbance.
+        peak_speed_ratio: Highest speed of the tip while it is not pushed, of the highest without disturbance.
         energy_j: ∫ Σ |τ q̇| dt over all joints.
         largest_torque_share: Of what a motor can give.
         largest_velocity_share: Of the fastest that a joint may be.

@@ -61,7 +61,7 @@ def fit_decoder(
     Args:
         decoder: Untrained.
         data: States to be encoded.
-        scale_m: Half the longest side of the box around them.
+        scale_m: Half the longest side of the box around them [m].
         settings: Weights and schedule.
         seed: Of the optimisation.
         checkpoint: Where progress is kept.

@@ -99,7 +99,11 @@ class TrajectoryReproduction:
         queried = torch.cat([known, self._to_metres(samples.starts).flatten(0, 1), chart.anchor[None]])
         z, push_forward = chart.chart.linearise(queried)
         image = z[-1]
-        velocities = push_forward(field(z - image))[: len(known)] / model.time_unit_s
+        shown = len(chosen)
+        laws = model.law_at(self._from_metres(self.states[chosen]))
+        latent = field(z - image)
+        paced = model.paced(latent[:shown], self.times[chosen][:, None], laws)
+        velocities = push_forward(torch.cat([paced, latent[shown:]]))[: len(known)] / model.time_unit_s
         latent_starts = (z[len(known) : -1] - image).view(samples.starts.shape)
         # a condition is the same in scaled and in latent coordinates, up to where they begin
         paths = [model.flow(latent_starts, samples.times, model.law_at(samples.starts), samples.begin).flatten(0, 2)]
@@ -108,12 +112,10 @@ class TrajectoryReproduction:
             paths.append(model.flow(latent_starts[:, first], curve_times, law).flatten(0, 1))
         count = sum(map(len, paths))
         if isinstance(field, EmbeddedField):
-            paths.append(field.project(z[: len(chosen)] - image))
+            paths.append(field.project(z[:shown] - image))
         x = self._from_metres(chart.chart.to_ambient(torch.cat(paths) + image))
 
-        speeds = model.law_at(self._from_metres(self.states[chosen])).speed(self.times[chosen])
-        predicted = velocities[: len(chosen)] * speeds[:, None]
-        error = (predicted - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
+        error = (velocities[:shown] - self.velocities[chosen]).square().sum(-1).mean() / self.mean_square_speed
         distance = (x[: len(paths[0])].view(samples.targets.shape) - samples.targets).square().sum(-1)
         equal_time = distance.mean()
         squares = [parameter.square().sum() for parameter in chart.parameters()]
@@ -127,7 +129,7 @@ class TrajectoryReproduction:
             apart = x[count:] - self._from_metres(self.states[chosen])
             losses["projection"] = settings.projection_weight * apart.square().sum(-1).mean()
         if settings.haste_weight > 0:
-            losses["haste"] = settings.haste_weight * self._haste(velocities[len(chosen) :])
+            losses["haste"] = settings.haste_weight * self._haste(velocities[shown:])
         if not curve_term:
             return losses | {"equal_time": settings.equal_time_warm_up_weight * equal_time}
         curve = x[len(paths[0]) : count].view(*curve_times.shape, -1)
