@@ -194,13 +194,14 @@ class TestARun:
 
     def test_a_damaged_checkpoint_is_named_and_a_fresh_start_works(self, here, refused, folder, monkeypatch):
         command = ("ncds", "train", *TOY, "seed=6")
+        before = set((folder / "runs/work").glob("*.checkpoint"))
         with monkeypatch.context() as patched:
             patched.setattr(StageRun, "log_series", lambda *_: os.kill(os.getpid(), signal.SIGINT))
             stopped = here(*command).done(130)
         assert stopped.complaints == [
             "ncds train: error: stopped by signal 2. Repeat the command to continue where it stopped."
         ]
-        (checkpoint,) = (folder / "runs/work").glob("*.checkpoint")
+        (checkpoint,) = set((folder / "runs/work").glob("*.checkpoint")) - before
         checkpoint.write_bytes(checkpoint.read_bytes()[:100])
         refused(command, f"{checkpoint} is corrupt", "train")
         here(*command, "reuse=false").done()
