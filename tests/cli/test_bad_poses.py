@@ -78,7 +78,8 @@ def test_44_joints_can_be_learned_and_exported(tmp_path, here, without_shape_che
         values = (1 + 0.1 * number) * joints * (1 - TIME_S[:, None]) ** 2
         np.savez(tmp_path / f"{number}.npz", time_s=TIME_S, joints_rad=values)
     answer = here(
-        "ncds", "export", "dataset=folder", f"dataset.root={tmp_path}", "field.skill_dim=2", *TOY, "output=json"
+        "ncds", "export", "dataset=folder", f"dataset.root={tmp_path}", "field.skill_dim=2", "time_law=none", *TOY,
+        "output=json",
     ).done()  # fmt: skip
     policy = answer.document["policy"]
     assert policy["inputs"]["joints_rad"]["shape"] == ["batch", 44]

@@ -24,11 +24,11 @@ def linear(start, folder):
 
 
 @pytest.fixture
-def line_integral(here, without_shape_checks):
+def line_integral(here):
     """Run once, reused then."""
     settings = [setting for setting in TOY if not setting.startswith("chart.")]
     thesis = ("field=line_integral", "field.hidden_units=[6,6]", "evaluation.verify_cells=0")
-    return here("ncds", "run", "dataset=letters/j", *settings, *thesis, "output=json").done()
+    return here("ncds", "eval", "dataset=letters/j", *settings, *thesis, "output=json").done()
 
 
 class TestRun:
@@ -109,8 +109,6 @@ class TestRun:
         share = line_integral.document["scores"]["scores"]["contraction.true.non_contracting_fraction"]["value"]
         assert 0 <= share <= 1
         assert certificate["audit"]["contraction.true.non_contracting_fraction"] == share
-        page = line_integral.artefact("report", "report.html").read_text()
-        assert "measured" in page.lower()
 
 
 class TestOneTrainedRun:

@@ -140,7 +140,7 @@ def test_the_other_coordinates_do_not_feel_the_region():
 # ---------------------------------------------------------------- rollouts
 def test_motions_stay_in_the_region_and_get_to_the_goal():
     safe = region(SUPPORT, OBSTACLE)
-    states, waited = follow_safely(SafeField(Funnel(), safe), starts(safe), torch.linspace(0, 8, 301).double())
+    states, waited = follow_safely(SafeField(Funnel(), safe), starts(safe), torch.linspace(0, 8, 161).double())
     assert safe.is_safe(states).all()
     assert waited == 0
     assert ((states[:, -1] - GOAL).norm(dim=1) < 0.02).all()
@@ -149,7 +149,7 @@ def test_motions_stay_in_the_region_and_get_to_the_goal():
 def test_only_help_gets_a_motion_past_an_obstacle_in_front_of_which_the_field_comes_together():
     safe = region(SUPPORT, BAR)
     head_on = torch.tensor([[-0.5, 0.1]], dtype=torch.float64)
-    times = torch.linspace(0, 10, 301).double()
+    times = torch.linspace(0, 10, 101).double()
     stopped, _ = follow_safely(SafeField(Funnel(), safe, onward=None), head_on, times)
     helped, _ = follow_safely(SafeField(Funnel(), safe), head_on, times)
     misled, _ = follow_safely(SafeField(Funnel(), safe, onward=against_geodesic), head_on, times)

@@ -166,7 +166,7 @@ def test_changes_that_say_nothing_are_refused(ncds, letters, switches):
 
 
 def test_a_field_without_conditions_takes_none(ncds):
-    ncds("train", "dataset=letters/l", "dataset.demos=3", "dataset.points=40", *TOY)
+    ncds("train", "dataset=letters/l", "dataset.demos=3", "dataset.points=40", *TOY, "training.steps=1")
     with pytest.raises(InvalidSetting, match="knows no conditions"):
         ncds("rollout", "run=latest", "rollout.condition=[1,0]")
 
@@ -175,7 +175,8 @@ def test_a_field_without_conditions_takes_none(ncds):
 def test_the_thesis_field_is_learned_exported_and_reported_with_labels(ncds):
     import mlflow
 
-    thesis = ["field=line_integral", "regulariser=constant", "chart=identity", "training=velocity"]
+    thesis = ["field=line_integral", "field.skew=true", "regulariser=state_dependent", "regulariser.hidden_units=[6]"]
+    thesis += ["chart=identity", "training=velocity"]
     result = ncds(
         "run", *LETTERS[:2], "dataset.condition=label", *LETTERS[3:], *thesis, "field.hidden_units=[8]", *TOY[2:],
     )  # fmt: skip

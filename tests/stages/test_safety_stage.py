@@ -16,9 +16,9 @@ from geomotion.errors import InvalidSetting
 from geomotion.figures.safety import save_safety_figures
 from geomotion.files import read_json
 from geomotion.models import ModelConfig, Skill
+from geomotion.stages import safety_picture
 from geomotion.stages.rollout import RolloutStageConfig, rollout
 from geomotion.stages.safety import certificate_part, judge_safety, safe
-from geomotion.stages.safety_picture import safety_picture
 from geomotion.tracking import Artefacts, StageRun
 from geomotion.training.data import Geometry
 
@@ -53,9 +53,11 @@ def inputs(skill: Skill, demonstrations: Demonstrations, tmp_path: Path) -> dict
     return {name: Artefacts(name, "0", tmp_path / name, "") for name in ("ingest", "train")}
 
 
-def test_motions_from_random_starts_stay_in_the_support_and_out_of_the_obstacle(skill, demonstrations, tmp_path):
+def test_motions_from_random_starts_stay_in_the_support_and_out_of_the_obstacle(
+    skill, demonstrations, tmp_path, monkeypatch
+):
     region = safe(SAFETY, BALL, skill, demonstrations)
-    settings = schema.EvaluationConfig(goal_duration=3.0)
+    settings = schema.EvaluationConfig(goal_duration=2.5)
     evaluation, starts = judge_safety(region, demonstrations, settings, count=40)
     values = {name: score.value for name, score in evaluation.scores.items()}
     assert values["safety.left_support"] == values["safety.entered_obstacle"] == values["safety.never_reached"] == 0
@@ -63,7 +65,8 @@ def test_motions_from_random_starts_stay_in_the_support_and_out_of_the_obstacle(
     assert values["safety.clearance"] > 0 > values["safety.clearance_without_region"]
     assert values["safety.unchanged"] > 0.3
     assert set(certificate_part(evaluation)["measured"]) == set(values)
-    save_safety_figures(safety_picture(region, starts[:5]), tmp_path)
+    monkeypatch.setattr(safety_picture, "STEPS", 60)
+    save_safety_figures(safety_picture.safety_picture(region, starts[:5]), tmp_path)
     assert {path.name for path in tmp_path.glob("*.png")} == {
         "safety_switching.png",
         "safety_distance.png",
@@ -72,7 +75,7 @@ def test_motions_from_random_starts_stay_in_the_support_and_out_of_the_obstacle(
 
 
 def test_a_rollout_goes_around_the_obstacle_and_back_to_the_surface(inputs, tmp_path):
-    starts = schema.RolloutConfig(starts_m=[[0.09, 0.002, 0.004]], duration_s=4.0, points=60)
+    starts = schema.RolloutConfig(starts_m=[[0.09, 0.002, 0.004]], duration_s=2.5, points=40)
     (tmp_path / "rollout").mkdir()
     run = StageRun(tmp_path / "rollout", tmp_path / "checkpoint", client=None, run_id="1")
     rollout(RolloutStageConfig(starts, schema.SolverConfig(), BALL, SAFETY), inputs, run)
@@ -81,7 +84,7 @@ def test_a_rollout_goes_around_the_obstacle_and_back_to_the_surface(inputs, tmp_
     assert row["clearance_m"] > 0
     states = storage.load(run.folder / "rollouts")[0].channels["position_m"]
     assert np.abs(states[-1, 2]) < 1e-4  # decayed as without a region
-    np.testing.assert_allclose(states[:, 2], 0.004 * np.exp(-10 * np.linspace(0, 4, 60)), atol=1e-5)
+    np.testing.assert_allclose(states[:, 2], 0.004 * np.exp(-10 * np.linspace(0, 2.5, 40)), atol=1e-5)
 
 
 def test_a_skill_of_three_dimensions_is_refused(skill, demonstrations):

@@ -106,10 +106,18 @@ def calibrated(name: str, volume: NodeValues, is_unsafe: Bool[np.ndarray, " node
 
     Raises:
         MissingData: If no node is unsafe: the obstacle is outside of what the manifold reaches, or between nodes.
+        InvalidSetting: If the volume vanishes at an unsafe node, and with it any α.
     """
     if not is_unsafe.any():
         raise MissingData(f"a latent node in {name}", "It does not stand in the way; leave it out, or refine the grid.")
-    return Reason(name, volume, levels.impenetrable * float(volume[is_unsafe].min()))
+    least = float(volume[is_unsafe].min())
+    if not least > 0:
+        raise InvalidSetting(
+            "safety.points_per_axis",
+            "too few",
+            f"more: {name} is not felt at all nodes that have to be kept away from it, so small is it beside an edge",
+        )
+    return Reason(name, volume, levels.impenetrable * least)
 
 
 def distance_on_grid(reasons: Sequence[Reason]) -> NodeValues:
