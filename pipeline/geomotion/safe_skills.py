@@ -16,9 +16,9 @@ from geomotion.manifolds.graph import GeodesicGraph
 from geomotion.models import Skill
 from geomotion.obstacles.ambient import ambient_factor, combine_factors
 from geomotion.obstacles.motion import MovingBody
-from geomotion.obstacles.safe_field import Onward, SafeField, along_geodesic
+from geomotion.obstacles.safe_field import PLANE, Onward, SafeField, along_geodesic
 from geomotion.obstacles.safety_region import Levels, Reason, SafetyRegion, calibrated, distance_on_grid
-from geomotion.skill_surface import PLANE, EmbeddedGrid, SkillSurface
+from geomotion.skill_surface import EmbeddedGrid, SkillSurface
 from geomotion.types import Float
 
 SUPPORT = "the surroundings of the data"

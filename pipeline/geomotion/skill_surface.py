@@ -15,16 +15,16 @@ from geomotion.manifolds.grid import LatentGrid
 from geomotion.manifolds.grid_metric import metric_on_grid
 from geomotion.models import Skill
 from geomotion.networks.rbf import RadialBasisNetwork
+from geomotion.obstacles.position_part import SPACE
+from geomotion.obstacles.safe_field import PLANE
 from geomotion.types import Float, Tensor
 
-PLANE = 2
 LARGEST_STD = 1.0  # of a coordinate far from the data, in sizes of the demonstrations
 SMALLEST_STD = 1e-3  # what the skill explains exactly is still not known better than that
 LIKELIHOOD_STEPS = 60
 POINTS_OF_A_PATH = 200
 POINTS_OF_A_FIT = 2000  # of the spreads
 KERNEL_STRIDE = 8  # points of a path for each kernel
-SPACE = 3  # coordinates of a position, where a state has more
 
 Codes = Float[Tensor, "*batch 2"]
 

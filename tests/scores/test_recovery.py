@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from geomotion.scores.recovery import Deviation, recovery, to_path
+from geomotion.scores.pushes import Path
+from geomotion.scores.recovery import Deviation, recovery
 
 TIMES_S = np.linspace(0, 10, 2401)
 
@@ -40,5 +41,5 @@ def test_a_disturbance_at_the_very_end_leaves_nothing_to_judge():
 
 def test_distances_are_to_the_path_between_its_points():
     path = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    distances = to_path(np.array([[0.5, 0.03, 0.0], [1.1, 0.0, 0.0]]), path)
+    distances = Path(path).distances(np.array([[0.5, 0.03, 0.0], [1.1, 0.0, 0.0]]))
     np.testing.assert_allclose(distances, [0.03, 0.1])

@@ -1,5 +1,6 @@
 """Poses of demonstrations as vectors that a field can be learned on."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +10,12 @@ from geomotion.demos.demonstrations import VELOCITY_OF, Array, Demonstrations, T
 from geomotion.demos.preprocessing import estimate_velocity
 from geomotion.errors import DatasetError
 from geomotion.lie.cover import FIRST_COVER
-from geomotion.lie.poses import CoverName, Group, PoseCoordinates
+from geomotion.lie.poses import POSE_DIM, CoverName, Group, PoseCoordinates
 from geomotion.lie.rotations import mean_quaternion
 from geomotion.scores.paths import of_one_sign
 
 POSE_CHANNEL = "pose_m"
+BODY_STATES: Mapping[tuple[str, ...], int] = {(POSE_CHANNEL,): POSE_DIM, ("position_m",): 3}  # of a body in space
 COVERED = 0.97  # of the first cover's radius; farther out, Log is about to jump and coordinates stretch without bound
 NEEDED = ("position_m", "orientation_wxyz")
 

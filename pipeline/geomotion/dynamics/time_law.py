@@ -45,7 +45,27 @@ class Clock:
         return times
 
 
-class SplineTimeLaw(nn.Module):
+class KnotTimeLaw(nn.Module):
+    """A time law from its speeds at knots, wherever these come from."""
+
+    def at_knots(self) -> Float[Tensor, "*group knot"]:
+        """θ̇ at the knots: one law for all times, or one for each group of them, which their first axes tell apart."""
+        raise NotImplementedError
+
+    def slowest(self) -> float:
+        """The smallest θ̇, which a knot has."""
+        return float(self.at_knots().detach().min())
+
+    def speed(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
+        """θ̇ at times after the start."""
+        return spline_speed(self.at_knots(), times)
+
+    def progress(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
+        """θ at times after the start."""
+        return spline_progress(self.at_knots(), times)
+
+
+class SplineTimeLaw(KnotTimeLaw):
     r"""A time law that is learned: θ̇ is piecewise linear.
 
     .. math::
@@ -68,22 +88,8 @@ class SplineTimeLaw(nn.Module):
         self.min_speed = min_speed
         self.raw_speeds = nn.Parameter(torch.full((knots + 1,), RAW_SPEED_ONE))
 
-    @property
-    def speeds(self) -> Float[Tensor, " knot"]:
-        """θ̇ at the knots."""
+    def at_knots(self) -> Float[Tensor, " knot"]:
         return speeds_at_knots(self.raw_speeds, self.min_speed)
-
-    def slowest(self) -> float:
-        """The smallest θ̇, which a knot has."""
-        return float(self.speeds.detach().min())
-
-    def speed(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
-        """θ̇ at times after the start."""
-        return spline_speed(self.speeds, times)
-
-    def progress(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
-        """θ at times after the start."""
-        return spline_progress(self.speeds, times)
 
 
 class ConditionalTimeLaw(nn.Module):
@@ -110,7 +116,7 @@ class ConditionalTimeLaw(nn.Module):
         return GivenTimeLaw(speeds_at_knots(condition @ self.raw_speeds, self.min_speed))
 
 
-class GivenTimeLaw(nn.Module):
+class GivenTimeLaw(KnotTimeLaw):
     """A time law from its speeds at the knots.
 
     Args:
@@ -123,17 +129,8 @@ class GivenTimeLaw(nn.Module):
         super().__init__()
         self.register_buffer("speeds", speeds)
 
-    def slowest(self) -> float:
-        """The smallest θ̇."""
-        return float(self.speeds.detach().min())
-
-    def speed(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
-        """θ̇ at times after the start."""
-        return spline_speed(self.speeds, times)
-
-    def progress(self, times: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
-        """θ at times after the start."""
-        return spline_progress(self.speeds, times)
+    def at_knots(self) -> Float[Tensor, "*group knot"]:
+        return self.speeds
 
 
 class LaterTimeLaw(nn.Module):

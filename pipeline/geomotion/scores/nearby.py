@@ -81,8 +81,14 @@ def nearby_distances(
 ) -> tuple[Distances, Distances]:
     """Distances between all rollouts at all times, Euclidean ones [m] and those of the claimed metric."""
     trajectories = roll(starts, times_s)
-    latent = to_claimed(trajectories.reshape(-1, starts.shape[1])).reshape(*trajectories.shape[:-1], -1)
-    return pairwise_distances(trajectories), pairwise_distances(latent)
+    return pairwise_distances(trajectories), pairwise_distances(claimed_coordinates(to_claimed, trajectories))
+
+
+def claimed_coordinates(
+    to_claimed: ToClaimed, trajectories: Float[np.ndarray, "start time D"]
+) -> Float[np.ndarray, "start time d"]:
+    """Trajectories in the coordinates where the claimed metric is Euclidean."""
+    return to_claimed(trajectories.reshape(-1, trajectories.shape[-1])).reshape(*trajectories.shape[:-1], -1)
 
 
 def bound_excess(distances: Distances, times_s: Float[np.ndarray, " time"], rate: float, note: str) -> Score:

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from geomotion.scores.array_field import ArrayField
 from geomotion.scores.evaluation import Evaluation
-from geomotion.scores.nearby import bound_excess
+from geomotion.scores.nearby import bound_excess, claimed_coordinates
 from geomotion.scores.score import Score, max_score, mean_score, share_score
 
 TIMES_PER_DURATION = 400
@@ -121,9 +121,9 @@ def follow_pushed(field: ArrayField, starts: Float[np.ndarray, "start D"], proto
     after_s = times_s[after] - times_s[push]
     pushed = later.roll(undisturbed[start, push] + protocol.offsets(starts.shape[1]), after_s)
     alongside = undisturbed[start, after]
-    between = _claimed(field, pushed) - _claimed(field, alongside)
-    paths = [cKDTree(refined(path[:, :3])) for path in undisturbed]
-    to_path = [_to_path(paths[which], states[:, :3]) for which, states in zip(start, pushed, strict=True)]
+    between = claimed_coordinates(field.to_claimed, pushed) - claimed_coordinates(field.to_claimed, alongside)
+    paths = [Path(path[:, :3]) for path in undisturbed]
+    to_path = [paths[which].distances(states[:, :3]) for which, states in zip(start, pushed, strict=True)]
     return Pushed(
         after_s,
         np.array(to_path),
@@ -170,20 +170,21 @@ def _speeds(
     return np.asarray(np.linalg.norm(velocities[:, :3], axis=1).reshape(states.shape[:2]))
 
 
-def _claimed(field: ArrayField, states: Float[np.ndarray, "start time D"]) -> Float[np.ndarray, "start time d"]:
-    return np.asarray(field.to_claimed(states.reshape(-1, states.shape[-1])).reshape(*states.shape[:-1], -1))
+class Path:
+    """A curve in space, ready for queries.
 
+    Args:
+        points_m: In the order in which they are passed, with straight lines between them [m].
+    """
 
-def refined(path_m: Float[np.ndarray, "time 3"]) -> Float[np.ndarray, "point 3"]:
-    """A path with more points on the straight lines between its own."""
-    times = np.arange(len(path_m))
-    between = np.linspace(0, times[-1], REFINED * times[-1] + 1)
-    return np.stack([np.interp(between, times, coordinate) for coordinate in path_m.T], axis=-1)
+    def __init__(self, points_m: Float[np.ndarray, "point 3"]) -> None:
+        numbers = np.arange(len(points_m))
+        between = np.linspace(0, numbers[-1], REFINED * numbers[-1] + 1)
+        self._tree = cKDTree(np.stack([np.interp(between, numbers, one) for one in points_m.T], axis=-1))
 
-
-def _to_path(path: cKDTree, positions_m: Float[np.ndarray, "time 3"]) -> Float[np.ndarray, " time"]:
-    """Infinite where a position is not finite."""
-    is_finite = np.isfinite(positions_m).all(axis=1)
-    distances = np.full(len(positions_m), np.inf)
-    distances[is_finite] = path.query(positions_m[is_finite])[0]
-    return distances
+    def distances(self, positions_m: Float[np.ndarray, "time 3"]) -> Float[np.ndarray, " time"]:
+        """From positions to the nearest point of the path [m]; infinite where a position is not finite."""
+        is_finite = np.isfinite(positions_m).all(axis=1)
+        distances = np.full(len(positions_m), np.inf)
+        distances[is_finite] = self._tree.query(positions_m[is_finite])[0]
+        return distances

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import cKDTree
 
-from geomotion.scores.pushes import RECOVERED, RETURNS, refined, settled
+from geomotion.scores.pushes import RECOVERED, RETURNS, settled
 
 Series = Float[np.ndarray, " time"]
 
@@ -41,12 +40,6 @@ class Recovery:
     pushed_m: float
     back_s: dict[int, float]
     claimed_rate_per_s: float
-
-
-def to_path(positions_m: Float[np.ndarray, "time 3"], path_m: Float[np.ndarray, "point 3"]) -> Series:
-    """Distance of positions to the nearest point of a path [m]."""
-    distances: Series = cKDTree(refined(path_m)).query(positions_m)[0]
-    return distances
 
 
 def recovery(deviation: Deviation, begins_s: float, ends_s: float, until_s: float) -> Recovery:

@@ -24,12 +24,12 @@ from geomotion.config import (
 )
 from geomotion.demos import storage
 from geomotion.demos.demonstrations import Demonstrations, Trajectory
-from geomotion.demos.pose_vectors import POSE_CHANNEL, with_pose_vectors
+from geomotion.demos.pose_vectors import BODY_STATES, POSE_CHANNEL, with_pose_vectors
 from geomotion.errors import InvalidSetting
 from geomotion.figures.evaluation import save_all
 from geomotion.figures.safety import save_safety_figures
 from geomotion.files import atomic, read_json, write_json
-from geomotion.lie.poses import POSE_DIM, PoseCoordinates
+from geomotion.lie.poses import PoseCoordinates
 from geomotion.models import Skill
 from geomotion.scores.array_field import ArrayField
 from geomotion.scores.contraction import judge_condition, judge_contraction
@@ -58,7 +58,6 @@ PEERS_TRIM_POINTS = 15
 PEERS_TRAIN_DEMOS = (0, 1, 2, 3, 4)
 PICTURE_POINTS_PER_AXIS = 40  # of the velocity field
 DRAWN_STARTS = 40  # of motions in a safety region
-PUSHABLE: Mapping[tuple[str, ...], int] = {(POSE_CHANNEL,): POSE_DIM, ("position_m",): 3}  # states of a body in space
 
 
 @dataclass(frozen=True)
@@ -300,7 +299,7 @@ def _pushes(
     field: ArrayField, skill: Skill, judged: Sequence[Judged], settings: EvaluationConfig, proven_rate: float | None
 ) -> Evaluation:
     """Only of states that begin with a position in space."""
-    if PUSHABLE.get(skill.state_channels) != field.field.dim:
+    if BODY_STATES.get(skill.state_channels) != field.field.dim:
         return Evaluation()
     pushes, duration_s = settings.pushes, skill.geometry.duration_s
     protocol = PushProtocol(pushes.count, pushes.size_m, pushes.at, duration_s, settings.seed)

@@ -110,7 +110,7 @@ def _plan(session: Session) -> VerbResult:
     places = f"picture  {found.path('figures/plan.png')}\nin 3-D   {found.path('scene.html')}{_in_latent_space(found)}"
     path = f"\npath     {found.path('path.npz')}" if document["found"] else ""
     text = f"{plan_table(document)}\n\n{places}{path}"
-    return VerbResult(text, session.document(plan=document), exit_code=0 if document["found"] else NO_PATH)
+    return VerbResult(text, session.document(plan=document), exit_code=0 if document["found"] else shared.NO_MOTION)
 
 
 def _in_latent_space(found: Artefacts) -> str:
@@ -131,7 +131,9 @@ def _replay(session: Session) -> VerbResult:
     document = read_json(found.path("replay.json"))
     film = found.folder / "film.gif"
     text = replay_table(document) + (f"\n\nfilm  {film}" if film.exists() else "")
-    return VerbResult(text, session.document(replay=document), exit_code=0 if _is_executed(document) else NO_PATH)
+    return VerbResult(
+        text, session.document(replay=document), exit_code=0 if _is_executed(document) else shared.NO_MOTION
+    )
 
 
 def _is_executed(replay: Mapping[str, Any]) -> bool:
@@ -143,8 +145,7 @@ def _report(session: Session) -> VerbResult:
     space = read_json(session.produce("ingest").path("summary.json"))["space"]
     is_of_joints = space == JOINTS or session.config.space is Space.joint
     name = "report" if is_of_joints or space.startswith("R3xS3") else "report without robot"
-    path = str(session.produce(name).path("report.html"))
-    return VerbResult(f"report  {path}", session.document(report=path))
+    return shared.report_verb(session, name)
 
 
 def _run(session: Session) -> VerbResult:
@@ -158,11 +159,10 @@ def _run(session: Session) -> VerbResult:
         succeeded = _is_executed(document["replay"])
         lines += ["", replay_table(document["replay"])]
     text = "\n".join([*lines, "", reported.text])
-    return VerbResult(text, document, exit_code=0 if succeeded else NO_PATH, objective=evaluated.objective)
+    return VerbResult(text, document, exit_code=0 if succeeded else shared.NO_MOTION, objective=evaluated.objective)
 
 
 LEAST_DIM = 2  # of a latent space
-NO_PATH = 3  # no path, or one that the arm cannot take: an answer, not a mistake; scripts can tell it from both
 
 GMS = Program(
     name="gms",

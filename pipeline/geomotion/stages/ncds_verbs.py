@@ -112,15 +112,16 @@ def _replay(session: Session) -> VerbResult:
     document = read_json(found.path("replay.json"))
     film = found.folder / "film.gif"
     text = policy_replay_table(document) + (f"\n\nfilm  {film}" if film.exists() else "")
-    return VerbResult(text, session.document(replay=document), exit_code=0 if document["executed"] else NOT_EXECUTED)
+    return VerbResult(
+        text, session.document(replay=document), exit_code=0 if document["executed"] else shared.NO_MOTION
+    )
 
 
 def _report(session: Session) -> VerbResult:
     """With what the arm did, where states are something that an arm can follow."""
     skill = conditional_models.load(session.produce("train").path("model.pt"))
     name = "report" if leads_an_arm(skill) else "report without robot"
-    path = str(session.produce(name).path("report.html"))
-    return VerbResult(f"report  {path}", session.document(report=path))
+    return shared.report_verb(session, name)
 
 
 def _run(session: Session) -> VerbResult:
@@ -140,8 +141,6 @@ def _certificate_line(certificate: dict[str, Any]) -> str:
     proven = f" at {rate:.3g} 1/s" if rate is not None else ""
     return f"contraction  {certificate['claim'].replace('_', ' ')}{proven}; metric: {certificate['metric']}"
 
-
-NOT_EXECUTED = 3  # a start that the arm cannot take: an answer, not a mistake; scripts can tell it from both
 
 NCDS = Program(
     name="ncds",

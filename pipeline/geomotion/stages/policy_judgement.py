@@ -17,7 +17,8 @@ from geomotion.robot.field_policy import ArmStates, PoseStates
 from geomotion.robot.policy_loop import PolicyRun
 from geomotion.robot.timed import RATE_HZ
 from geomotion.scores.paths import PosePath
-from geomotion.scores.recovery import Deviation, Recovery, recovery, to_path
+from geomotion.scores.pushes import Path
+from geomotion.scores.recovery import Deviation, Recovery, recovery
 from geomotion.stages.executed import finite_or_none
 from geomotion.stages.policy_execution import Disturbances
 from geomotion.stages.policy_motion import Undisturbed
@@ -136,7 +137,7 @@ def _deviation(
     time_s = run.tracking.time_s
     then = np.stack([np.interp(time_s, alone.time_s, coordinate) for coordinate in alone.states.T], axis=-1)
     difference = _claimed(skill, moved, time_s, executed) - _claimed(skill, moved, time_s, then)
-    aside_m = to_path(run.tracking.position_m, alone.position_m)
+    aside_m = Path(alone.position_m).distances(run.tracking.position_m)
     return Deviation(time_s, aside_m, np.linalg.norm(difference, axis=1))
 
 

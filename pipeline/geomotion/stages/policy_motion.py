@@ -11,7 +11,7 @@ from jaxtyping import Float
 from geomotion import config as schema
 from geomotion.conditional_models import ConditionalSkill
 from geomotion.demos.demonstrations import Demonstrations
-from geomotion.demos.pose_vectors import POSE_CHANNEL, with_pose_vectors
+from geomotion.demos.pose_vectors import BODY_STATES, with_pose_vectors
 from geomotion.dynamics.fields import TimedField, TimedVelocity
 from geomotion.dynamics.moved_goal import MovedGoal
 from geomotion.dynamics.rollout import rollout
@@ -25,11 +25,7 @@ from geomotion.robot.inverse_kinematics import JointPath, exactly, solve_path
 from geomotion.robot.panda_arm import panda_arm
 from geomotion.stages.scene import around_obstacles, grown, solids
 
-ARM_STATES: Mapping[tuple[str, ...], int] = {
-    (POSE_CHANNEL,): 6,
-    ("position_m",): SPACE,
-    ("joints_rad",): len(panda.JOINTS),
-}
+ARM_STATES: Mapping[tuple[str, ...], int] = {**BODY_STATES, ("joints_rad",): len(panda.JOINTS)}
 LONGER = 1.25  # times a demonstration: the end is approached ever more slowly
 HAND_DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 NOMINAL_HZ = 30.0

@@ -9,9 +9,8 @@ from geomotion.dynamics.embedded import EmbeddedField
 from geomotion.dynamics.fields import VectorField
 from geomotion.dynamics.rollout import judge
 from geomotion.errors import InvalidSetting
-from geomotion.obstacles.safe_field import follow_safely
+from geomotion.obstacles.safe_field import PLANE, follow_safely
 from geomotion.safe_skills import SafeSkill, nearest_body_m
-from geomotion.skill_surface import PLANE
 from geomotion.stages.phases import GOAL_TOLERANCE, REGION, Followed, Start
 from geomotion.types import Float, States, Tensor, Times
 

@@ -12,13 +12,13 @@ from geomotion.demos.demonstrations import Demonstrations
 from geomotion.dynamics.rollout import rollout
 from geomotion.errors import InvalidSetting
 from geomotion.models import Skill
-from geomotion.obstacles.safe_field import follow_safely
+from geomotion.obstacles.position_part import SPACE
+from geomotion.obstacles.safe_field import PLANE, follow_safely
 from geomotion.safe_skills import SafeSkill, safe_skill
 from geomotion.scores.evaluation import Evaluation, combine
 from geomotion.scores.grids import bounding_box
 from geomotion.scores.safety import Passage, judge_passages, judge_safe_contraction
 from geomotion.scores.score import Score, share_score
-from geomotion.skill_surface import PLANE, SPACE
 from geomotion.stages.scene import moving_bodies
 from geomotion.types import Float, Trajectories
 

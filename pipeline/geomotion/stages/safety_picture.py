@@ -6,10 +6,9 @@ import torch
 from geomotion.dynamics.fields import VectorField
 from geomotion.dynamics.rollout import rollout
 from geomotion.figures.safety import SafetyPicture
-from geomotion.obstacles.safe_field import Onward, against_geodesic, follow_safely
+from geomotion.obstacles.safe_field import PLANE, Onward, against_geodesic, follow_safely
 from geomotion.obstacles.safety_region import distance_on_grid
 from geomotion.safe_skills import SafeSkill
-from geomotion.skill_surface import PLANE
 from geomotion.types import Float
 
 STEPS, DURATIONS = 300, 3.0  # of the rollouts

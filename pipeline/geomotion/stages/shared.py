@@ -6,6 +6,7 @@ from geomotion.stages import compare, regression
 from geomotion.stages.ingest import summary_table
 from geomotion.stages.session import Session, VerbResult
 
+NO_MOTION = 3  # no path, or one that the arm cannot take: an answer, not a mistake; scripts can tell it from both
 EXECUTION_KEYS = frozenset(("evaluation", "obstacle", "tracking", "output", "reuse", "run", "runs", "check", "hydra"))
 
 
@@ -17,9 +18,9 @@ def ingest_verb(session: Session) -> VerbResult:
     return VerbResult(text, session.document(summary=summary))
 
 
-def report_verb(session: Session) -> VerbResult:
-    """Write the report."""
-    path = str(session.produce("report").path("report.html"))
+def report_verb(session: Session, step: str) -> VerbResult:
+    """Write the report by one of the program's steps, with what a robot did or without."""
+    path = str(session.produce(step).path("report.html"))
     return VerbResult(f"report  {path}", session.document(report=path))
 
 
