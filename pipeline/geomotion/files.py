@@ -21,7 +21,8 @@ def atomic(path: Path) -> Iterator[Path]:
         DiskFull: If space, quota or a size limit ran out.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}-{uuid4().hex}{path.suffix}")  # unlike mkstemp's, with usual permissions
+    name = f"{temporary_prefix(path)}-{uuid4().hex}{path.suffix}"
+    temporary = path.with_name(name)  # unlike mkstemp's, with usual permissions
     try:
         yield temporary
         temporary.replace(path)
@@ -31,6 +32,11 @@ def atomic(path: Path) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def temporary_prefix(path: Path) -> str:
+    """How the names of files begin that a process killed in `atomic` leaves beside `path`."""
+    return f".{path.stem}"
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -101,7 +101,10 @@ def test_a_failing_stage_marks_both_runs_failed_and_leaves_no_artefacts(config):
 
 def test_a_stopped_stage_is_marked_killed_and_continued_in_the_same_run(config):
     def stop(settings, inputs, run):
-        run.checkpoint.write_text("halfway")
+        with atomic(run.checkpoint) as temporary:
+            temporary.write_text("halfway")
+            killed_while_written = temporary.with_stem(f"{temporary.stem}0")
+            killed_while_written.write_text("half of it")
         raise Interrupted(signal.SIGTERM, "again")
 
     def resume(settings, inputs, run):
@@ -115,7 +118,7 @@ def test_a_stopped_stage_is_marked_killed_and_continued_in_the_same_run(config):
     finished = execute(config, Stage("train", resume), {})
     assert finished.run_id == stopped[0].info.run_id
     assert finished.path("value.txt").read_text() == "halfway and done"
-    assert not list((Path(config.root) / "work").glob("*.checkpoint"))
+    assert not list((Path(config.root) / "work").glob("*.checkpoint"))  # hidden files, too
 
 
 def test_what_was_logged_before_a_failure_is_kept(config):

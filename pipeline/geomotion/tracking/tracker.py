@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 
 from geomotion.config import TrackingConfig, plain
 from geomotion.errors import GeomotionError, Interrupted, MissingRun
-from geomotion.files import write_json
+from geomotion.files import temporary_prefix, write_json
 from geomotion.tracking import store
 from geomotion.tracking.artefacts import Artefacts, digest_of, environment, run_key
 from geomotion.tracking.stage import Stage, StageRun
@@ -162,7 +162,8 @@ class Tracker:
         return list(self.work.glob(f"{checkpoint.name}*"))
 
     def _discard(self, checkpoint: Path) -> None:
-        for path in self._kept(checkpoint):
+        killed_while_written = self.work.glob(f"{temporary_prefix(checkpoint)}*")
+        for path in [*self._kept(checkpoint), *killed_while_written]:
             path.unlink(missing_ok=True)
 
     @contextmanager
