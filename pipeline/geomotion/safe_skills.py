@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 
 from geomotion.config import RiemannianSafety
 from geomotion.dynamics.fields import ChartedField, VectorField
@@ -17,7 +17,14 @@ from geomotion.models import Skill
 from geomotion.obstacles.ambient import ambient_factor, combine_factors
 from geomotion.obstacles.motion import MovingBody
 from geomotion.obstacles.safe_field import PLANE, Onward, SafeField, along_geodesic
-from geomotion.obstacles.safety_region import Levels, Reason, SafetyRegion, calibrated, distance_on_grid
+from geomotion.obstacles.safety_region import (
+    Levels,
+    Reason,
+    SafetyRegion,
+    calibrated,
+    distance_on_grid,
+    narrowest_passage,
+)
 from geomotion.skill_surface import EmbeddedGrid, SkillSurface
 from geomotion.types import Float
 
@@ -132,16 +139,19 @@ def safe_skill(
     reasons = [Reason(SUPPORT, volume, config.nu * float(np.quantile(demonstrated, config.support_quantile)))]
     factor = np.ones(len(volume))
     if bodies:
-        factor = combine_factors([_factor(body, nodes, config.obstacle_gain) for body in bodies])
-        is_inside = nearest_body_m(bodies, nodes.decoded_m) < nodes.half_edges_m() + config.margin_m
+        kept_away_m = nodes.half_edges_m() + config.margin_m
         is_supported = distance_on_grid(reasons) > levels.impenetrable
-        reasons.append(calibrated("the obstacle", nodes.volume(factor) / volume - 1, is_inside & is_supported, levels))
+        is_unsafe = (nearest_body_m(bodies, nodes.decoded_m) < kept_away_m) & is_supported
+        felt_m = kept_away_m[is_unsafe].max(initial=0.0)  # a smaller obstacle would be felt less far than it counts
+        factor = combine_factors([_factor(body, nodes, felt_m, config.obstacle_gain) for body in bodies])
+        reasons.append(calibrated("the obstacle", nodes.volume(factor) / volume - 1, is_unsafe, levels))
     graph = GeodesicGraph(nodes.grid, nodes.position, nodes.rest, nodes.stretch, np.zeros(len(nodes.grid.edges)))
     graph.feel(np.arange(graph.nodes), factor[None], np.full(graph.nodes, np.inf))
     goal = surface.encoded(skill.goal[None])
     goal_node = int(nodes.grid.nearest(goal)[0])
-    support, _ = _region(nodes, graph, reasons[:1], levels, goal_node)
-    region, way = _region(nodes, graph, reasons, levels, goal_node)
+    first_nodes = nodes.grid.nearest(np.stack([one[0] for one in surface.codes]))
+    support, _ = _region(nodes, graph, reasons[:1], levels, first_nodes, goal_node)
+    region, way = _region(nodes, graph, reasons, levels, first_nodes, goal_node)
     return SafeSkill(
         skill, surface, nodes, nodes.volume(factor), tuple(reasons), support, region, graph, way, tuple(bodies), goal
     )
@@ -155,16 +165,24 @@ def nearest_body_m(
     return np.asarray(np.min(distances, axis=0)) if distances else np.full(len(positions), np.inf)
 
 
-def _factor(body: MovingBody, nodes: EmbeddedGrid, gain: float) -> Float[np.ndarray, " node"]:
+def _factor(body: MovingBody, nodes: EmbeddedGrid, felt_m: float, gain: float) -> Float[np.ndarray, " node"]:
     if body.motion.travelled(0.0, 1.0) > 0:
         raise InvalidSetting("obstacle", body.name, "obstacles at rest: a safety region is computed once")
-    return ambient_factor(body.signed_distance(nodes.decoded_m, 0.0), body.body.inradius, gain)
+    return ambient_factor(body.signed_distance(nodes.decoded_m, 0.0), max(body.body.inradius, felt_m), gain)
 
 
 def _region(
-    nodes: EmbeddedGrid, graph: GeodesicGraph, reasons: Sequence[Reason], levels: Levels, goal_node: int
+    nodes: EmbeddedGrid,
+    graph: GeodesicGraph,
+    reasons: Sequence[Reason],
+    levels: Levels,
+    first_nodes: Int[np.ndarray, " demo"],
+    goal_node: int,
 ) -> tuple[SafetyRegion, Float[np.ndarray, " node"]]:
-    """The region for some reasons, and the ways to the goal in it, which the graph then has."""
+    """The region for some reasons, and the ways to the goal in it, which the graph then has.
+
+    Wherever a demonstration starts, the goal can be reached unless the region has no way at all.
+    """
     distance = distance_on_grid(reasons)
     is_safe: Bool[np.ndarray, " node"] = distance > levels.impenetrable
     if not is_safe[goal_node]:
@@ -173,4 +191,6 @@ def _region(
         raise InvalidSetting("obstacle", "over the goal", "one that leaves the goal free, or a smaller safety.margin_m")
     graph.close(~is_safe)
     way = graph.costs_from(goal_node)
-    return SafetyRegion(nodes.grid, distance, way, levels), way
+    connected = first_nodes[np.isfinite(way[first_nodes])]
+    passage = narrowest_passage(nodes.grid, distance, connected, goal_node)
+    return SafetyRegion(nodes.grid, distance, way, levels.below(passage)), way

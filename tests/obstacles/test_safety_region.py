@@ -8,7 +8,14 @@ from torch import nn
 from geomotion.errors import InvalidSetting, MissingData
 from geomotion.manifolds.grid import LatentGrid
 from geomotion.obstacles.safe_field import SafeField, against_geodesic, follow_safely
-from geomotion.obstacles.safety_region import Levels, Reason, SafetyRegion, calibrated, distance_on_grid
+from geomotion.obstacles.safety_region import (
+    Levels,
+    Reason,
+    SafetyRegion,
+    calibrated,
+    distance_on_grid,
+    narrowest_passage,
+)
 
 LEVELS = Levels()
 GRID = LatentGrid(np.array([-2.0, -2.0]), np.array([2.0, 2.0]), 61)
@@ -183,3 +190,32 @@ def test_a_motion_cannot_tunnel_through_a_wall():
     before = starts(safe)[starts(safe)[:, 0] < 0.3]
     states, _ = follow_safely(SafeField(Funnel(), safe), before, torch.linspace(0, 5, 26).double())
     assert (states[..., 0] < 0.3).all()
+
+
+# ---------------------------------------------------------------- passages
+ACROSS = np.exp(-(((GRID.nodes[:, 0] - 0.3) / 0.25) ** 2) + np.clip((GRID.nodes[:, 1] / 0.6) ** 2, 0, 6))
+WALL = calibrated("a wall with a gap", ACROSS, ACROSS > np.e, LEVELS)
+
+
+def test_the_narrowest_passage_is_the_saddle_of_the_distance():
+    distance = distance_on_grid([WALL])
+    first, last = GRID.nearest(np.array([[-1.0, 0.0], [1.5, 0.0]]))
+    in_gap = distance[np.isclose(GRID.nodes[:, 0], 0.3, atol=0.04) & (np.abs(GRID.nodes[:, 1]) < 0.04)].min()
+    assert narrowest_passage(GRID, distance, np.array([first]), int(last)) == pytest.approx(in_gap, rel=0.02)
+    assert narrowest_passage(GRID, distance, np.array([last]), int(last)) == distance[last]
+
+
+def test_motions_pass_a_bottleneck_once_nu_is_lowered_to_it():
+    distance = distance_on_grid([SUPPORT, WALL])
+    way = np.linalg.norm(GRID.nodes - GOAL.numpy(), axis=1)
+    begin = torch.stack([torch.full((9,), -0.6), torch.linspace(-0.2, 0.2, 9)], dim=1).double()
+    first, last = GRID.nearest(begin.numpy()), int(GRID.nearest(GOAL.numpy()[None])[0])
+    passage = narrowest_passage(GRID, distance, first, last)
+    assert LEVELS.guarded < passage < LEVELS.inactive
+    ends = [
+        follow_safely(SafeField(Funnel(), SafetyRegion(GRID, distance, way, levels)), begin, torch.linspace(0, 12, 241))
+        for levels in (LEVELS, LEVELS.below(passage))
+    ]
+    stuck, through = ((states[:, -1] - GOAL).norm(dim=-1) > 0.05 for states, _ in ends)
+    assert stuck.all() and not through.any()
+    assert SafetyRegion(GRID, distance, way, LEVELS).is_safe(ends[1][0]).all()

@@ -12,13 +12,16 @@ Source: Thesis Sec. 6.3.
 """
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 from torch import nn
 
 from geomotion.errors import InvalidSetting, MissingData
@@ -28,6 +31,7 @@ from geomotion.types import Float, Tensor
 
 SHARPNESS = 4  # of the minimum over reasons to stay away
 GUARD = 0.01  # of ρ, by which a motion stops before it: room for the error of a step
+NARROWEST = 1.1  # ν over where a motion stops, at least
 DIRECTION_FLOOR = 1e-12  # a shorter gradient has no direction
 
 Points = Float[Tensor, "*batch 2"]
@@ -62,6 +66,14 @@ class Levels:
     def guarded(self) -> float:
         """The distance at which a motion stops, a little more than ρ."""
         return (1 + GUARD) * self.impenetrable
+
+    def below(self, passage: float) -> "Levels":
+        """With ν lowered to the S of a passage, which a motion can then pass.
+
+        Before a bottleneck, n points back from it, and up to the middle of the sigmoid next to no motion against n is
+        left, however far above ρ the bottleneck is; getting through would take many times the duration of the skill.
+        """
+        return replace(self, inactive=min(self.inactive, max(passage, NARROWEST * self.guarded)))
 
     def switched(self, distance: Tensor, initial: float, end: float) -> Tensor:
         r"""Ξ: `initial` up to ρ, `end` from ν on, and a sigmoid between them.
@@ -125,6 +137,27 @@ def distance_on_grid(reasons: Sequence[Reason]) -> NodeValues:
     closeness = np.stack([one.closeness for one in reasons])
     largest = closeness.max(axis=0)
     return np.asarray(1 / (largest * ((closeness / largest) ** SHARPNESS).sum(axis=0) ** (1 / SHARPNESS)))
+
+
+def narrowest_passage(grid: LatentGrid, distance: NodeValues, starts: Int[np.ndarray, " start"], goal: int) -> float:
+    """The largest S that a way to the goal can keep from every start: the S of its bottleneck.
+
+    Args:
+        grid: Of the nodes.
+        distance: S at them.
+        starts: Numbers of nodes from which there is a way at all.
+        goal: Another one.
+    """
+    ends, lowest = grid.edges, distance[grid.edges].min(axis=1)
+    wanted = np.append(starts, goal)
+
+    def has_none(level: float) -> bool:
+        open_ends = ends[lowest >= level]
+        linked = csr_array((np.ones(len(open_ends)), open_ends.T), shape=(len(distance),) * 2)
+        return bool(np.ptp(connected_components(linked, directed=False)[1][wanted]) > 0)
+
+    levels = np.sort(distance[distance <= distance[wanted].min()])
+    return float(levels[bisect_left(levels, True, lo=1, key=has_none) - 1])
 
 
 @dataclass(frozen=True)
