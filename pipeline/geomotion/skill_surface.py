@@ -15,8 +15,8 @@ from geomotion.manifolds.grid import LatentGrid
 from geomotion.manifolds.grid_metric import metric_on_grid
 from geomotion.models import Skill
 from geomotion.networks.rbf import RadialBasisNetwork
-from geomotion.obstacles.position_part import SPACE
 from geomotion.obstacles.safe_field import PLANE
+from geomotion.obstacles.solids import SPACE
 from geomotion.types import Float, Tensor
 
 LARGEST_STD = 1.0  # of a coordinate far from the data, in sizes of the demonstrations

@@ -194,7 +194,7 @@ def test_a_motion_cannot_tunnel_through_a_wall():
 
 # ---------------------------------------------------------------- passages
 ACROSS = np.exp(-(((GRID.nodes[:, 0] - 0.3) / 0.25) ** 2) + np.clip((GRID.nodes[:, 1] / 0.6) ** 2, 0, 6))
-WALL = calibrated("a wall with a gap", ACROSS, ACROSS > np.e, LEVELS)
+WALL = calibrated("a wall with a gap", ACROSS, np.e < ACROSS, LEVELS)
 
 
 def test_the_narrowest_passage_is_the_saddle_of_the_distance():

@@ -123,6 +123,7 @@ class GuardedSolver:
 
     def _enters(self, x: State, found: Float[Tensor, "start time D"], stretch: Stretch) -> Bool[Tensor, " start"]:
         enters = torch.zeros_like(x[:, 0], dtype=torch.bool)
+        x, found = self.field.position(x), self.field.position(found)
         for obstacle in self.field.obstacles:
             was_outside = _depth(obstacle, x, stretch.begin_s) <= _touch(obstacle, x)
             times = found.new_tensor(stretch.wanted_s)[:, None]
@@ -133,13 +134,14 @@ class GuardedSolver:
         self, x: State, found: Float[Tensor, "start time D"], stretch: Stretch
     ) -> Float[Tensor, "start time D"]:
         times = found.new_tensor(stretch.wanted_s)[:, None]
+        before, after = self.field.position(x), self.field.position(found)  # parts of states, not copies
         for obstacle in self.field.obstacles:
-            was_outside = _depth(obstacle, x, stretch.begin_s) <= _touch(obstacle, x)
-            inside = was_outside[:, None] & (_depth(obstacle, found, times) > 0)
+            was_outside = _depth(obstacle, before, stretch.begin_s) <= _touch(obstacle, before)
+            inside = was_outside[:, None] & (_depth(obstacle, after, times) > 0)
             if bool(inside.any()):
-                moved = (obstacle.velocity * times).expand_as(found)[inside]
-                direction = unit(found[inside] - moved - obstacle.reference)
-                found[inside] = surface_points(obstacle, direction) + moved
+                moved = (obstacle.velocity * times).expand_as(after)[inside]
+                direction = unit(after[inside] - moved - obstacle.reference)
+                after[inside] = surface_points(obstacle, direction) + moved
         return found
 
 

@@ -45,6 +45,26 @@ def modulation_matrix(obstacle: Obstacle, x: State, reactivity: float = 1.0) -> 
     return (1 + decay) * eye - 2 * decay * contact.lift[..., :, None] * contact.normal[..., None, :]
 
 
+class PositionSlice(nn.Module):
+    """The velocity of the position as a field of the position alone, the other coordinates held.
+
+    Args:
+        field: Of states that begin with a position.
+        held: The other coordinates, shape (D - Dx,).
+    """
+
+    held: Tensor
+
+    def __init__(self, field: VectorField, held: Float[Tensor, " other"]) -> None:
+        super().__init__()
+        self.field, self.dim = field, field.dim - len(held)
+        self.register_buffer("held", held)
+
+    def forward(self, x: State) -> Velocity:
+        velocity: Velocity = self.field(torch.cat([x, self.held.expand(*x.shape[:-1], -1)], dim=-1))
+        return velocity[..., : self.dim]
+
+
 class ModulatedField(nn.Module):
     """A field with obstacles in it.
 
@@ -65,9 +85,11 @@ class ModulatedField(nn.Module):
         hold: Whether an obstacle slows what moves away from it, too, as (5.12) has it: behind it, states at its surface
             then leave as slowly as others approach it.
         time_s: When velocities are asked for, for moving obstacles [s].
+        held: Where states are more than a position: what the other coordinates are when ways around obstacles are tried
+            out, shape (D - obstacle.dim,). Only the velocity of the position is modulated.
 
     Raises:
-        ShapeMismatch: If obstacles and field differ in dimension.
+        ShapeMismatch: If obstacles and field differ in dimension, less what is held.
         InvalidSetting: If a number is not positive, or there is no obstacle.
     """
 
@@ -80,6 +102,7 @@ class ModulatedField(nn.Module):
         recovery_time_s: float = 0.1,
         hold: bool = False,
         time_s: float = 0.0,
+        held: Float[Tensor, " other"] | None = None,
     ) -> None:
         super().__init__()
         for name, value in (("reactivity", reactivity), ("recovery_time_s", recovery_time_s)):
@@ -87,10 +110,12 @@ class ModulatedField(nn.Module):
                 raise InvalidSetting(f"obstacle.{name}", value, "a number above 0")
         if not obstacles:
             raise InvalidSetting("obstacle", "none", "an obstacle or more")
-        for obstacle in obstacles:
-            if obstacle.dim != field.dim:
-                raise ShapeMismatch("coordinates of an obstacle", field.dim, obstacle.dim)
         self.field, self.dim = field, field.dim
+        self.space = field.dim if held is None else field.dim - len(held)
+        for obstacle in obstacles:
+            if obstacle.dim != self.space:
+                raise ShapeMismatch("coordinates of an obstacle", self.space, obstacle.dim)
+        self.moving = field if held is None else PositionSlice(field, held)
         self.obstacles = tuple(obstacles)
         self.reactivity, self.recovery_time_s, self.hold, self.time_s = reactivity, recovery_time_s, hold, time_s
         self.ways = [self._way(obstacle) if escape else None for obstacle in obstacles]
@@ -105,6 +130,14 @@ class ModulatedField(nn.Module):
 
     def modulate(self, x: State, wanted: Velocity, time: Float[Tensor, "*batch 1"]) -> Velocity:
         """What obstacles make of velocities at states and times [s]."""
+        modulated = self._modulate(self.position(x), self.position(wanted), time)
+        return modulated if self.space == self.dim else torch.cat([modulated, wanted[..., self.space :]], dim=-1)
+
+    def position(self, x: Float[Tensor, "*batch D"]) -> Float[Tensor, "*batch Dx"]:
+        """The part of states that obstacles stand in the way of."""
+        return x[..., : self.space]
+
+    def _modulate(self, x: State, wanted: Velocity, time: Float[Tensor, "*batch 1"]) -> Velocity:
         shifted = [x - obstacle.velocity * time for obstacle in self.obstacles]
         pairs = list(zip(self.obstacles, shifted, strict=True))
         velocities = [
@@ -126,7 +159,7 @@ class ModulatedField(nn.Module):
         """Of an obstacle that moves, where a trial would be out of date, the one that f prefers."""
         if bool(obstacle.velocity.any()):
             return own_way
-        return choose_way(self.field, obstacle, partial(self._flow, obstacle))
+        return choose_way(self.moving, obstacle, partial(self._flow, obstacle))
 
     def _flow(self, obstacle: Obstacle, x: State, relative: Velocity, way: Way | None) -> Velocity:
         return flow_around(

@@ -9,6 +9,7 @@ from torch import nn
 from geomotion.errors import InvalidSetting, ShapeMismatch
 from geomotion.types import Float, State, Tensor
 
+SPACE = 3
 NEWTON_STEPS = 20  # from a start above the root of a convex function; eight suffice for axes of ratio 100
 
 

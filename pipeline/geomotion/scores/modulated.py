@@ -4,14 +4,12 @@ That a contracting field stays contracting when it is modulated is not proven, i
 motions part.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 import torch
 
 from geomotion.dynamics.fields import Chart
 from geomotion.obstacles.modulation import ModulatedField
-from geomotion.obstacles.obstacle import Obstacle, clearance
+from geomotion.obstacles.obstacle import clearance
 from geomotion.scores.contraction import contraction_scores
 from geomotion.scores.evaluation import Evaluation, Roll
 from geomotion.scores.jacobians import eigenvalues_in_metric, field_jacobian, symmetric_eigenvalues
@@ -32,7 +30,7 @@ def judge_modulated_contraction(field: ModulatedField, chart: Chart, points: Sta
     Source:
         Thesis Sec. 5.4, Eq. (2.15).
     """
-    points = points[is_free(field.obstacles, points)]
+    points = points[is_free(field, points)]
     if len(points) == 0:
         return Evaluation(omitted={"obstacles.contraction": "no point of the grid is outside of the obstacles"})
     spectra = {
@@ -72,7 +70,7 @@ def judge_modulated_nearby(
 
 
 def judge_passage(
-    obstacles: Sequence[Obstacle],
+    field: ModulatedField,
     states: Trajectories,
     times: Times,
     goal: Float[Tensor, " D"],
@@ -82,7 +80,7 @@ def judge_passage(
     """Whether rollouts stay outside of obstacles and get to the goal.
 
     Args:
-        obstacles: Where they are at time zero.
+        field: The field among obstacles.
         states: Trajectories that start outside, shape (start, time, D) [m].
         times: [s].
         goal: [m].
@@ -90,7 +88,7 @@ def judge_passage(
         note: How the starts were chosen.
     """
     never = (states[:, -1] - goal).norm(dim=-1) > tolerance_m
-    gaps = 1000 * clearance(obstacles, states, times).double().numpy()
+    gaps = 1000 * clearance(field.obstacles, field.position(states), times).double().numpy()
     smallest = Score(float(gaps.min()), "mm", len(gaps), statistic="min", note=f"at output times; {note}")
     never_note = f"not within {1000 * tolerance_m:.3g} mm of the goal after {float(times[-1]):.3g} s; {note}"
     return Evaluation(
@@ -101,6 +99,6 @@ def judge_passage(
     )
 
 
-def is_free(obstacles: Sequence[Obstacle], points: States) -> Bool[Tensor, " point"]:
+def is_free(field: ModulatedField, points: States) -> Bool[Tensor, " point"]:
     """Which points are outside of all obstacles at time zero."""
-    return torch.stack([obstacle.level(points) > 1 for obstacle in obstacles]).all(dim=0)
+    return torch.stack([obstacle.level(field.position(points)) > 1 for obstacle in field.obstacles]).all(dim=0)

@@ -53,7 +53,7 @@ def judge_among_obstacles(
         return np.asarray(found.states.double().numpy())
 
     def free(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(points[is_free(field.obstacles, array.tensor(points)).numpy()])
+        return np.asarray(points[is_free(field, array.tensor(points)).numpy()])
 
     trained = [demonstrations[number] for number in skill.train_demos]
     tight = bounding_box([one.state(skill.state_channels) for one in trained])
@@ -71,7 +71,7 @@ def judge_among_obstacles(
             else Evaluation(omitted={"obstacles.contraction": "the claimed metric is one of the decoder's manifold"}),
             judge_modulated_nearby(roll, array.to_claimed, free(nearby), time_s),
             judge_passage(
-                field.obstacles,
+                field,
                 array.tensor(roll(outside, times_s)),
                 array.tensor(times_s),
                 skill.goal,

@@ -141,7 +141,7 @@ def follow_phases(
         parts.append(kept)
         velocities.append(_velocities(phase, kept, own))
         if phase.field is not None:
-            clearances.append(float(clearance(phase.field.obstacles, kept, own - phase.begins_s)))
+            clearances.append(float(clearance(phase.field.obstacles, phase.field.position(kept), own - phase.begins_s)))
         notes.append(found.note)
         if phase.begins_s > 0:
             changes.append(_change(phase, found.states[0], grid))

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from geomotion import config as schema
 from geomotion.errors import InvalidSetting
-from geomotion.obstacles.position_part import SPACE
+from geomotion.obstacles.solids import SPACE
 from geomotion.robot import panda
 from geomotion.robot.arm import Arm
 from geomotion.robot.disturbances import Displacement, Push, Sensors

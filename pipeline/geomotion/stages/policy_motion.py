@@ -17,7 +17,7 @@ from geomotion.dynamics.moved_goal import MovedGoal
 from geomotion.dynamics.rollout import rollout
 from geomotion.errors import InvalidSetting
 from geomotion.models import Skill
-from geomotion.obstacles.position_part import SPACE, ModulatedPosition, PositionSlice
+from geomotion.obstacles.solids import SPACE
 from geomotion.robot import panda
 from geomotion.robot.arm import Arm
 from geomotion.robot.field_policy import JointStates, PoseStates, PositionStates
@@ -134,12 +134,8 @@ def led_field(config: PolicyReplayConfig, skill: Skill) -> tuple[TimedVelocity, 
         shifts[:, :SPACE] = torch.tensor([change.shift_m for change in changes])
         field = moved = MovedGoal(field, torch.tensor([change.time_s for change in changes]), shifts)
     obstacles = grown(config.obstacle, config.replay.clearance_m)
-    if len(goal) == SPACE:
-        return around_obstacles(obstacles, field, goal) or field, moved
-    if is_in_space:
-        around = around_obstacles(obstacles, PositionSlice(field, goal[SPACE:]), goal[:SPACE])
-        return (field if around is None else ModulatedPosition(field, around)), moved
-    return field, moved
+    around = around_obstacles(obstacles, field, goal, SPACE) if is_in_space else None
+    return around or field, moved
 
 
 def undisturbed(field: TimedVelocity, states: AnyStates, begins: Beginning, arm: Arm, duration_s: float) -> Undisturbed:

@@ -12,8 +12,8 @@ from geomotion.demos.demonstrations import Demonstrations
 from geomotion.dynamics.rollout import rollout
 from geomotion.errors import InvalidSetting
 from geomotion.models import Skill
-from geomotion.obstacles.position_part import SPACE
 from geomotion.obstacles.safe_field import PLANE, follow_safely
+from geomotion.obstacles.solids import SPACE
 from geomotion.safe_skills import SafeSkill, safe_skill
 from geomotion.scores.evaluation import Evaluation, combine
 from geomotion.scores.grids import bounding_box

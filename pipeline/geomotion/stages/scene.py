@@ -20,7 +20,7 @@ from geomotion.obstacles.enclosure import enclose
 from geomotion.obstacles.modulation import ModulatedField
 from geomotion.obstacles.motion import ConstantVelocity, Motion, MovingBody, Waypoints
 from geomotion.obstacles.obstacle import Obstacle, overlap
-from geomotion.obstacles.solids import Box, Ellipsoid, Sphere
+from geomotion.obstacles.solids import SPACE, Box, Ellipsoid, Sphere
 from geomotion.obstacles_files import Placement, load_mesh, load_point_cloud, load_triangles
 from geomotion.types import Float, Tensor
 
@@ -33,11 +33,11 @@ def modulated(config: schema.ObstacleConfig, skill: Skill) -> ModulatedField | N
     Raises:
         InvalidSetting: If an obstacle does not fit the state, or one at rest covers the goal.
     """
-    return around_obstacles(config, skill.field, skill.goal)
+    return around_obstacles(config, skill.field, skill.goal, len(skill.goal) if skill.pose is None else SPACE)
 
 
 def around_obstacles(
-    config: schema.ObstacleConfig, field: VectorField, goal: Float[Tensor, " D"]
+    config: schema.ObstacleConfig, field: VectorField, goal: Float[Tensor, " D"], space: int
 ) -> ModulatedField | None:
     """A field with obstacles in it; nothing in free space.
 
@@ -45,6 +45,7 @@ def around_obstacles(
         config: The obstacles.
         field: In the precision of the goal.
         goal: Where it leads.
+        space: How many of the first coordinates are the position that obstacles stand in the way of.
 
     Raises:
         InvalidSetting: If an obstacle does not fit the state, or one at rest covers the goal.
@@ -52,12 +53,14 @@ def around_obstacles(
     bodies = solids(config)
     if not isinstance(config, schema.Avoidance) or not bodies:
         return None
-    obstacles = [_avoidable(body, goal) for body in bodies]
+    position, held = goal[:space], goal[space:]
+    obstacles = [_avoidable(body, position) for body in bodies]
     for body, obstacle in zip(bodies, obstacles, strict=True):
-        if float(obstacle.level(goal)) < 1 and not bool(obstacle.velocity.any()):
+        if float(obstacle.level(position)) < 1 and not bool(obstacle.velocity.any()):
             raise InvalidSetting("obstacle.centre_m", body.centre_m, "an obstacle that leaves the goal free")
     _refuse_overlaps(obstacles)
-    return ModulatedField(field, obstacles, config.reactivity, config.escape, config.recovery_time_s, config.hold)
+    options = (config.reactivity, config.escape, config.recovery_time_s, config.hold)
+    return ModulatedField(field, obstacles, *options, held=held if len(held) else None)
 
 
 def grown(config: schema.ObstacleConfig, by_m: float) -> schema.ObstacleConfig:
