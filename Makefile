@@ -12,10 +12,10 @@ endif
 export OMP_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint format type check bench certify obstacles regress ui clean
+.PHONY: help install demo test lint format type check bench certify obstacles regress thesis thesis-small ui clean
 
 help:  ## show this list
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 18
 
 install: $(STAMP)  ## set up .venv (done by every other target when needed; PIP_ARGS= for pip, PYTHON= for an interpreter)
 
@@ -46,7 +46,7 @@ type: $(STAMP)  ## types of the library and the command line
 
 check: lint type test  ## everything that a change has to pass
 
-SEARCHES := benchmarks/certificates.py benchmarks/obstacles.py  # have targets of their own
+SEARCHES := $(addprefix benchmarks/,certificates.py obstacles.py thesis.py)  # have targets of their own
 
 bench: $(STAMP)  ## time velocity queries, integration, training, kinematics, graphs and replanning
 	@for script in $(filter-out $(SEARCHES),$(wildcard benchmarks/[a-z]*.py)); do \
@@ -58,10 +58,21 @@ certify: $(STAMP)  ## search for violations of what is claimed by construction, 
 obstacles: $(STAMP)  ## send 1000 random starts past each of ten sets of obstacles: none may enter (minutes)
 	$(BIN)/python benchmarks/obstacles.py
 
-regress: $(STAMP)  ## small pinned experiments against their stored scores
-	@for name in $(notdir $(basename $(wildcard conf/experiment/regression/*.yaml))); do \
+regress: $(STAMP)  ## small pinned experiments against their stored scores; JUnit files in runs/regression (UPDATE=true stores new ones)
+	@failed=0; for name in $(notdir $(basename $(wildcard conf/experiment/regression/*.yaml))); do \
 		case $$name in gms_*) program=gms;; *) program=ncds;; esac; \
-		$(BIN)/$$program check experiment=regression/$$name || exit 1; done
+		$(BIN)/$$program check experiment=regression/$$name check.junit=runs/regression/$$name.xml \
+			$(if $(UPDATE),check.update=$(UPDATE)) || failed=1; done; exit $$failed
+
+thesis: $(STAMP)  ## every experiment of the thesis at full size (hours) into docs/results.md; ROBOTASKS9=folder MMM=file name recordings
+	$(BIN)/python benchmarks/thesis.py --results docs/results.md $(RECORDINGS)
+
+thesis-small: $(STAMP)  ## the same at toy size (minutes): that everything runs; tables are printed
+	$(BIN)/python benchmarks/thesis.py --small --jobs 2 --root runs/thesis-small $(RECORDINGS)
+
+ROBOTASKS9 ?= $(wildcard ../shared/data/robotasks9-franka)
+MMM ?= $(wildcard ../shared/data-evaluation-only/kit-mmm/00001_mmm.xml)
+RECORDINGS = $(if $(ROBOTASKS9),--robotasks9 $(ROBOTASKS9)) $(if $(MMM),--mmm $(MMM))
 
 ui: $(STAMP)  ## MLflow pages of runs/
 	$(BIN)/ncds ui

@@ -47,6 +47,12 @@ def robotasks9_folder() -> Path:
 
 
 @pytest.fixture(scope="session")
+def mmm_folder() -> Path:
+    """Folder with a recording of a person in MMM XML, and the model."""
+    return _folder(SHARED / "data-evaluation-only/kit-mmm", "A recording in MMM XML")
+
+
+@pytest.fixture(scope="session")
 def _empty_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An initialised MLflow store, which takes seconds to make; tests copy it."""
     from geomotion.config import TrackingConfig

@@ -12,7 +12,7 @@ LIBRARY = REPOSITORY / "pipeline/geomotion"
 
 LAYERS = (  # each may import those above it in this list, and itself
     {"errors", "types"},
-    {"files", "interrupts", "tables"},
+    {"files", "interrupts", "tables", "xml_files"},
     {"lie"},
     {"manifolds"},
     {"dynamics"},
@@ -24,8 +24,10 @@ LAYERS = (  # each may import those above it in this list, and itself
     {"networks", "arms"},
     {"baselines", "demos"},
     {"training"},
+    {"baseline_models"},
     {"models", "manifold_models", "policy_model"},
     {"learned_manifold", "conditional_models", "skill_surface"},
+    {"pictured_skills"},
     {"policy"},
     {"export", "safe_skills"},
     {"figures"},
@@ -39,6 +41,7 @@ FRAMEWORKS = {"hydra", "mlflow", "omegaconf"}
 FRAMEWORK_USERS = {"config", "tracking", "stages", "policy_model"}  # the last is run by MLflow, outside of us
 CONFIG_READERS = {
     "arms",
+    "baseline_models",
     "demos",
     "models",
     "manifold_models",

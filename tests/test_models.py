@@ -41,6 +41,22 @@ CONFIGURATIONS = {
         schema.NoRegulariser(),
         1,
     ),
+    "SEDS": ModelConfig(schema.IdentityChart(), schema.SedsField(), schema.NoRegulariser(), 1),
+    "Euclideanizing flow": ModelConfig(
+        schema.FlowChart(layers=2), schema.EuclideanizingFlowField(hidden_units=[8]), schema.NoRegulariser(), 1
+    ),
+    "Imitation flow": ModelConfig(
+        schema.FlowChart(layers=2),
+        schema.ImitationFlowField(drift=schema.LatentDrift.linear),
+        schema.NoRegulariser(),
+        1,
+    ),
+    "ELCD": ModelConfig(
+        schema.FlowChart(layers=2),
+        schema.ElcdField(hidden_units=[8], activation=schema.Activation.silu),
+        schema.NoRegulariser(),
+        1,
+    ),
     "line integral, eigenvalues": ModelConfig(
         schema.IdentityChart(), schema.LineIntegralField(hidden_units=[20]), schema.EigenvalueRegulariser(), 1
     ),

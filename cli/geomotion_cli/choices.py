@@ -16,6 +16,7 @@ _GMS_GROUPS = {"dataset", "obstacle", "experiment", "space"}  # its other settin
 _GMS_EXPERIMENT = re.compile(r"thesis/(gms|fig_[34]_.*)|regression/gms_.*")  # chapters 3 and 4 of the thesis
 _OF_GMS = {"experiment": _GMS_EXPERIMENT, "space": re.compile("joint|pose")}  # the other program has the rest
 _OF_BOTH = {"demonstrated"}
+_OF_NCDS = {"dataset": {"mmm", "panda/grasp_and_drop"}}  # people are no arms, and geodesics do not look
 _INTERNAL_SUFFIX = "_schema"  # bases of other options, of no use by themselves
 
 
@@ -30,6 +31,8 @@ def program_options(program: str) -> dict[str, list[str]]:
     is_gms = program == "gms"
     for group, of_gms in _OF_GMS.items():
         found[group] = [one for one in found[group] if one in _OF_BOTH or bool(of_gms.fullmatch(one)) == is_gms]
+    for group, of_ncds in _OF_NCDS.items() if is_gms else ():
+        found[group] = [one for one in found[group] if one not in of_ncds]
     return {group: options for group, options in found.items() if not is_gms or group in _GMS_GROUPS}
 
 

@@ -67,9 +67,16 @@ _PLANNING = {
     "mesh, point_cloud, several",
 }
 _COMPARE = Verb(
-    "table of the scores of several runs",
-    {"runs=[ID,ID]": "MLflow run ids, paths or latest", **_JSON},
-    ("runs=[latest,0f3a]", "runs=[0f3a,77c1] output=json"),
+    "table of the scores of several runs, or of every cell of a study",
+    {
+        "runs=[ID,ID]": "MLflow run ids, paths or latest",
+        "experiment=thesis/table_6_2": "a study: methods x datasets x seeds, resumable",
+        "study.jobs=2": "cells at once on this machine",
+        "study.shards=4 study.shard=0": "a part of the cells, for one job or machine",
+        "tracking.merge=[FOLDER]": "take over what other results folders have",
+        **_JSON,
+    },
+    ("runs=[latest,0f3a]", "experiment=thesis/table_6_2 study.seeds=[0,1,2]"),
 )
 _CHECK = Verb(
     "repeat a small pinned experiment; fails where a score got worse than its stored baseline",

@@ -17,7 +17,7 @@ from geomotion.errors import CorruptArtefact
 from geomotion.models import Skill
 from geomotion.training.conditioning import Conditioning
 from geomotion.training.data import Geometry
-from geomotion.types import Float, State, Tensor, Velocity
+from geomotion.types import Float, State, Tensor, Trajectories, Velocity
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,14 @@ class ConditionalPolicy(nn.Module):
         stretch, slowdown = self.units(condition)
         velocity: Tensor = self.field(self.augmented(x, condition), None if elapsed_s is None else elapsed_s / slowdown)
         return stretch / slowdown * velocity[..., : self.dim]
+
+    def trajectories(
+        self, start: State, condition: Float[Tensor, "*batch K"], times: Float[Tensor, "*#batch time"]
+    ) -> Trajectories:
+        """Where motions are at times since their start [s], only where these are known in closed form."""
+        stretch, slowdown = self.units(condition)
+        found = self.field.solve(self.augmented(start, condition), times / slowdown)[..., : self.dim]
+        return (self._code(condition) @ self.shifts)[..., None, :] + stretch[..., None] * found
 
     def augmented(self, x: State, condition: Float[Tensor, "*batch K"]) -> Float[Tensor, "*batch augmented"]:
         """States of the field: in its frame, with the codes of their conditions as lengths behind them."""

@@ -9,6 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from dataclasses import field as default
 from enum import Enum
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, ClassVar
 
 from hydra.core.config_store import ConfigStore
@@ -43,6 +46,7 @@ LETTERS = ("c", "j", "l", "n", "s", "sine", "u", "v", "w", "z")
 REACH_TARGETS = 3  # places of an object to be grasped
 DIVERGENCE_WEIGHT = 0.2  # of a manifold of poses
 POURING_GROUPS = 3  # bottles, each poured into its own cup
+GRASP_PLACES = 3  # of the object that is grasped and dropped
 
 
 def _require(condition: bool, key: str, found: object, expected: str) -> None:
@@ -92,6 +96,7 @@ class PoseSpace(Enum):
 
     R3xSO3 = "R3xSO3"  # q and -q are one orientation
     R3xS3 = "R3xS3"  # they are a whole turn apart
+    RnxR3xSO3 = "RnxR3xSO3"  # n joints, and the pose of what carries them, Sec. 6.4.7
 
 
 class Cover(Enum):
@@ -106,7 +111,8 @@ class PoseConfig:
     """Vectors of poses: position, and rotation from the mean orientation, without the edge of its first cover."""
 
     cover: Cover = Cover.radial
-    lever_m_per_rad: float | None = None  # length that counts as a radian; null: positions and turns extend equally far
+    # length that counts as a radian; null: positions and turns extend equally far, or 1 beside joints, as these count
+    lever_m_per_rad: float | None = None
 
     def __post_init__(self) -> None:
         if self.lever_m_per_rad is not None:
@@ -369,6 +375,52 @@ class PandaPouringDataset(GeneratedDataset):
             self.train_demos, self.test_demos = list(range(last)), list(range(last, self.demos))
 
 
+class ManipulationSkill(Enum):
+    """The two motions of grasp-and-drop, each a policy of its own."""
+
+    grasp = "grasp"
+    drop = "drop"
+
+
+@dataclass
+class GraspAndDropDataset(GeneratedDataset):
+    """The simulated Panda grasps a soft-looking object at one of three places and drops it into a bin, Sec. 6.4.8.
+
+    Each demonstration succeeds in simulation; pictures of the scene are taken before both skills.
+    """
+
+    skill: ManipulationSkill = ManipulationSkill.grasp  # what verbs other than `run` and `ingest` are about
+    demos: int = 7  # of each skill at each place
+    points: int = 500
+    duration_s: float = 3.5  # of each skill
+    snapshots: int = 50  # of each place, before each skill
+    snapshots_on_the_way: int = 50  # of each place, the hand on its way to a place; 0: none, as in the thesis
+    snapshots_between: int = 300  # of objects anywhere between, with where they lie; 0: none, as in the thesis
+    picture_px: int = 128  # width and height
+    scenery: float = 1.0  # how much light, colours, textures and the camera's pose differ; 0: not at all
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("dataset", self, "snapshots")
+        for name in ("snapshots_on_the_way", "snapshots_between"):
+            _require(getattr(self, name) >= 0, f"dataset.{name}", getattr(self, name), "0 or more")
+        _require(32 <= self.picture_px <= 224, "dataset.picture_px", self.picture_px, "32 to 224")
+        _require(0 <= self.scenery <= 3, "dataset.scenery", self.scenery, "a number from 0 to 3")
+        if self.train_demos is None and self.test_demos is None:
+            self.train_demos, self.test_demos = self.demos_of(self.skill)
+
+    def demos_of(self, skill: ManipulationSkill) -> tuple[list[int], list[int]]:
+        """Numbers of the demonstrations of a skill to train on and to hold out: of each place the last ones."""
+        held_out = min(self.held_out or 0, self.demos - 1)
+        first = 0 if skill is ManipulationSkill.grasp else GRASP_PLACES * self.demos
+        numbers = [
+            [first + place * self.demos + repeat for repeat in range(self.demos)] for place in range(GRASP_PLACES)
+        ]
+        shown = self.demos - held_out
+        train, test = ([one for of in numbers for one in of[part]] for part in (slice(shown), slice(shown, None)))
+        return train, test
+
+
 # ---------------------------------------------------------------- demonstrations in joint space
 class Overlap(Enum):
     """Where solutions of one task share their joint positions, so that a path may change between them."""
@@ -475,6 +527,37 @@ class RoboTasks9JointDataset(RoboTasks9Dataset):
         _require(self.points >= 10, "dataset.points", self.points, "10 or more")
         _require(0 <= self.variation <= 3, "dataset.variation", self.variation, "a number from 0 to 3")
         _require_seed("dataset.", self)
+
+
+@dataclass
+class MmmDataset(DatasetConfig):
+    """Whole-body human motion in the XML of the Master Motor Map, Sec. 6.4.7; each recording is a demonstration."""
+
+    name: str = "mmm"
+    path: str = MISSING  # an XML file with joint positions
+    further_paths: list[str] = default(default_factory=list)  # other recordings of the same motion
+    motion: str | None = None  # its name, where a file holds several with joints
+    joints: list[str] | None = None  # those to learn, in this order; null: all
+    perturbed: int = 0  # how many perturbed copies of the first recording are demonstrations as well
+    perturbation_rad: float = 0.05  # standard deviation of the copies' joints, and of the turn of their root
+    perturbation_m: float = 0.02  # of the place of their root
+    seed: int = 0  # of the copies
+    skeleton: str | None = None  # the model's file, to draw the person; null: the one beside the recording, if any
+    height_m: float | None = None  # of the person, by which the model is scaled; null: as the recording says
+    length_unit: LengthUnit = LengthUnit.mm  # the format's own; files do not say
+    angle_unit: AngleUnit = AngleUnit.rad
+    state_channels: list[str] | None = default(default_factory=lambda: ["joints_rad"])
+    held_out: int | None = 0
+
+    def __post_init__(self) -> None:
+        for name in ("perturbed", "perturbation_rad", "perturbation_m"):
+            _require(getattr(self, name) >= 0, f"dataset.{name}", getattr(self, name), "0 or more")
+        _require_seed("dataset.", self)
+        if self.height_m is not None:
+            _require(0.3 < self.height_m < 3, "dataset.height_m", self.height_m, "metres, or null")
+        if self.joints is not None:
+            distinct = len(self.joints) == len(set(self.joints)) > 0
+            _require(distinct, "dataset.joints", self.joints, "names of joints, one or more, each once")
 
 
 @dataclass
@@ -677,6 +760,104 @@ class VelocityNetworkField(FieldConfig):
 
     def __post_init__(self) -> None:
         _require_layer_widths("field", self.hidden_units)
+
+
+@dataclass
+class AnchoredField(FieldConfig):
+    """A field of others, or of the user, in coordinates whose origin is the goal."""
+
+
+@dataclass
+class SedsField(AnchoredField):
+    """Mixture of stable linear systems, Khansari-Zadeh and Billard 2011; nothing is claimed about contraction."""
+
+    components: int = 5  # Sec. 6.4.1
+    min_rate_per_duration: float = 0.01  # at which each of them contracts, at least; the mixture does not
+
+    def __post_init__(self) -> None:
+        _require_positive("field", self, "components", "min_rate_per_duration")
+
+
+@dataclass
+class EuclideanizingFlowField(AnchoredField):
+    """Straight to the goal in a flow's coordinates, at a learned speed, Rana et al. 2020."""
+
+    hidden_units: list[int] = default(default_factory=lambda: [100, 100])  # of the speed
+    activation: Activation = Activation.silu
+
+    def __post_init__(self) -> None:
+        _require_layer_widths("field", self.hidden_units)
+
+
+class LatentDrift(Enum):
+    """What Imitation flow's coordinates do without noise."""
+
+    linear = "linear"
+    saturated = "saturated"  # linear next to the goal, of constant speed elsewhere
+
+
+@dataclass
+class ImitationFlowField(AnchoredField):
+    """Stochastic dynamics in a flow's coordinates, Urain et al. 2020."""
+
+    drift: LatentDrift = LatentDrift.saturated  # as the authors take it for handwriting
+    initial_std: float = 0.1  # of the noise over the mean duration, in each coordinate
+
+    def __post_init__(self) -> None:
+        _require_positive("field", self, "initial_std")
+
+
+@dataclass
+class ElcdField(AnchoredField):
+    """ż = A(z) z with a negative definite symmetric part of A, Jaffe et al. 2024; in general A is no Jacobian."""
+
+    hidden_units: list[int] = default(default_factory=lambda: [64])  # of each of two networks; 16 in Sec. 6.4.1
+    activation: Activation = Activation.tanh
+    min_rate_per_duration: float = 0.01  # at which every motion comes to the goal, at least
+
+    def __post_init__(self) -> None:
+        _require_layer_widths("field", self.hidden_units)
+        _require_positive("field", self, "min_rate_per_duration")
+
+
+@dataclass
+class MovementPrimitiveField(AnchoredField):
+    """A probabilistic movement primitive, Paraschos et al. 2013: a plan for each start, not a velocity of a state."""
+
+    weights: int = 30  # of each coordinate
+
+    def __post_init__(self) -> None:
+        _require(self.weights >= 2, "field.weights", self.weights, "2 or more")
+
+
+@dataclass
+class CustomField(AnchoredField):
+    """A class of the user's own, found on Python's path, see docs/methods.md."""
+
+    target: str = MISSING  # module.Class
+    settings: dict[str, Any] = default(default_factory=dict)  # its arguments beside the number of coordinates
+    source_sha256: str | None = None  # of its file, filled in: a changed file is another field
+
+    def __post_init__(self) -> None:
+        digest = _source_digest(self.target)
+        same = self.source_sha256 in (None, digest)
+        _require(same, "field.target", self.target, "the file that the model was trained with; it has changed since")
+        self.source_sha256 = digest
+
+
+def _source_digest(target: str) -> str:
+    """SHA-256 of the file of a class."""
+    module = target.rpartition(".")[0]
+    expected = "module.Class, of a .py file on Python's path (PYTHONPATH=.)"
+    _require(all(part.isidentifier() for part in target.split(".")) and module != "", "field.target", target, expected)
+    try:
+        spec = find_spec(module)
+    except ImportError:
+        spec = None
+    path = Path(spec.origin) if spec is not None and spec.origin is not None else None
+    if path is None or path.suffix != ".py":
+        raise InvalidSetting("field.target", target, f"{expected}; there is no module {module}")
+    return sha256(path.read_bytes()).hexdigest()
 
 
 @dataclass
@@ -1011,6 +1192,26 @@ class VelocityTraining(TrainingConfig):
         _require_positive("training", self, "batch_points", "curl_points")
         for name in ("curl_weight", "curl_margin", "contraction_weight", "contraction_reserve_per_duration"):
             _require(getattr(self, name) >= 0, f"training.{name}", getattr(self, name), "0 or more")
+
+
+@dataclass
+class LikelihoodTraining(TrainingConfig):
+    """Transitions of a stochastic field, as Imitation flow is trained."""
+
+    steps: int = 4000
+    learning_rate: float = 5e-3
+    batch_points: int = 256
+    longest_step: float = 0.02  # between the two states of a transition, of the mean duration
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_positive("training", self, "batch_points")
+        _require(0 < self.longest_step <= 1, "training.longest_step", self.longest_step, "a share above 0, at most 1")
+
+
+@dataclass
+class ClosedFormTraining(TrainingConfig):
+    """For fields that need no steps, because they are computed from the demonstrations."""
 
 
 @dataclass
@@ -1390,6 +1591,33 @@ class PushesConfig:
 
 
 @dataclass
+class BodyConfig:
+    """A body in motion, drawn: as it was demonstrated, led by the skill, and led by it from elsewhere, Fig. 6.14."""
+
+    offset_rad: float = 0.5  # of every joint from where the demonstration starts, to random sides
+    seed: int = 0  # of the sides
+    snapshots: int = 8
+    film: bool = True
+    film_fps: float = 20.0
+
+    def __post_init__(self) -> None:
+        _require_positive("body", self, "snapshots", "film_fps")
+        _require(self.offset_rad >= 0, "body.offset_rad", self.offset_rad, "0 or more")
+        _require_seed("body.", self)
+
+
+@dataclass
+class JointReturnsConfig:
+    """Starts that are off in every joint, from which a motion in joint space has to come back to the demonstration."""
+
+    count: int = 22
+    offset_rad: float = 0.5
+
+    def __post_init__(self) -> None:
+        _require_positive("evaluation.joint_returns", self, "count", "offset_rad")
+
+
+@dataclass
 class EvaluationConfig:
     """Scores and the grids on which they are taken."""
 
@@ -1406,6 +1634,7 @@ class EvaluationConfig:
     timed_steps: int = 0  # single integration steps of the thesis' way that are timed beside ours, Table 6.3; 0: none
     verify_cells: int = 5000  # tried to prove contraction on the box, where it is not by construction; 0: not tried
     pushes: PushesConfig = default(default_factory=PushesConfig)
+    joint_returns: JointReturnsConfig = default(default_factory=JointReturnsConfig)
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -1475,6 +1704,8 @@ class StudyConfig:
     figures: list[str] = default(default_factory=list)
     notes: list[str] = default(default_factory=list)  # what a reader of the table has to know
     jobs: int = 1  # processes
+    shards: int = 1  # parts that the cells are dealt out to, one for each machine or job
+    shard: int | None = None  # which part is run, from 0; null: all cells
 
     def __post_init__(self) -> None:
         if not self.variants and not self.datasets:
@@ -1492,7 +1723,11 @@ class StudyConfig:
         }
         for name, items in unique.items():
             _require(len(set(items)) == len(items), f"study.{name}", items, "each one once")
-        _require_positive("study", self, "jobs")
+        _require_positive("study", self, "jobs", "shards")
+        if self.shard is not None:
+            _require(
+                0 <= self.shard < self.shards, "study.shard", self.shard, f"0 to study.shards - 1 = {self.shards - 1}"
+            )
 
 
 # ---------------------------------------------------------------- commands
@@ -1502,6 +1737,7 @@ class TrackingConfig:
 
     root: str = "runs"  # SQLite store, artefacts and checkpoints
     uri: str | None = None  # any other MLflow store; `root` then keeps checkpoints only
+    merge: list[str] = default(default_factory=list)  # other results folders; what is finished there is taken over
     experiment: str = "geomotion"
     register_as: str | None = None  # name in the model registry
     ui_port: int = 5000  # of `ui`
@@ -1520,6 +1756,7 @@ class CheckConfig:
 
     baseline: str | None = None  # null: the one stored for the experiment
     update: bool = False
+    junit: str | None = None  # XML file for continuous integration
 
 
 @dataclass
@@ -1627,6 +1864,49 @@ class ReplayConfig(SimulationConfig):
 
 
 @dataclass
+class EncoderConfig:
+    """From pictures to conditions, Sec. 6.4.8: ResNet-18, frozen, and a layer from its features to three numbers."""
+
+    weights: str = "random"  # random (seeded), a folder of weights, or what was downloaded from the hub, by its name
+    tiles: int = 4  # the network sees tiles x tiles overlapping parts of a picture; 1: the picture, as in the thesis
+    class_weight: float = 1.0  # of the cross-entropy
+    trajectory_weight: float = 1.0  # of demonstrated trajectories under the condition that a picture gives
+    place_weight: float = 1.0  # of the object's place, in pictures that come with it
+    weight_penalty: float = 1e-4  # on the layer's squared weights
+    steps: int = 100  # of L-BFGS
+    seed: int = 0  # of random weights, and of which trajectories go with which picture
+
+    def __post_init__(self) -> None:
+        _require_positive("encoder", self, "tiles", "weight_penalty", "steps")
+        for name in ("class_weight", "trajectory_weight", "place_weight"):
+            _require(getattr(self, name) >= 0, f"encoder.{name}", getattr(self, name), "0 or more")
+        _require(self.weights != "", "encoder.weights", "''", "random, a folder or a name on the hub")
+        _require_seed("encoder.", self)
+
+
+@dataclass
+class EpisodesConfig:
+    """Looking, grasping, looking and dropping in simulation, again and again."""
+
+    per_place: int = 20  # at each place that was demonstrated
+    between: int = 30  # elsewhere between these
+    moved: int = 10  # begun at a demonstrated place, from where the object is moved to another before it is grasped
+    control_hz: float = 30.0  # divides 240
+    looks_per_s: float = 4.0  # on the way to the object; 0: it looks before each skill only
+    look_until_m: float = 0.15  # from where the hand will grasp: nearer than this it does not look again
+    film_fps: float = 10.0
+    seed: int = 1000  # of places, light, colours and the camera's pose
+
+    def __post_init__(self) -> None:
+        _require_positive("episodes", self, "control_hz", "look_until_m", "film_fps")
+        _require(self.looks_per_s >= 0, "episodes.looks_per_s", self.looks_per_s, "0 or more")
+        for name in ("per_place", "between", "moved"):
+            _require(getattr(self, name) >= 0, f"episodes.{name}", getattr(self, name), "0 or more")
+        _require(self.per_place + self.between + self.moved > 0, "episodes.per_place", 0, "an episode or more")
+        _require_seed("episodes.", self)
+
+
+@dataclass
 class ArmFailuresConfig:
     """Random joint solutions of decoded poses, and how many of them touch the obstacle, Sec. 4.4, Fig. 4.4."""
 
@@ -1706,8 +1986,11 @@ class NcdsConfig(CommandConfig):
     solver: SolverConfig = default(default_factory=SolverConfig)
     rollout: RolloutConfig = default(default_factory=RolloutConfig)
     replay: ReplayConfig = default(default_factory=ReplayConfig)
+    body: BodyConfig = default(default_factory=BodyConfig)
     evaluation: EvaluationConfig = default(default_factory=EvaluationConfig)
     policy: PolicyConfig = default(default_factory=PolicyConfig)
+    encoder: EncoderConfig = default(default_factory=EncoderConfig)  # for dataset=panda/grasp_and_drop
+    episodes: EpisodesConfig = default(default_factory=EpisodesConfig)  # the same
 
 
 def plain(value: object) -> Any:
@@ -1740,7 +2023,8 @@ def _dataset_choices() -> dict[str, dict[str, Any]]:
         | conditioned
         | {"angle_to_targets": to_targets, "pose": {"defaults": ["lasa_pose_schema", "_self_"]}},
         "robotasks9": {task: {"task": task} for task in ROBOTASKS9_TASKS} | {"other": {}},
-        "robotasks9_joint": {task: {"task": task} for task in ROBOTASKS9_TASKS} | {"other": {}},
+        "robotasks9_joint": {task: {"task": task} for task in ROBOTASKS9_TASKS}
+        | {"other": {}, "pouring_one_elbow": {"task": "pouring", "elbow": {"solutions": 1}}},
         "letters": {letter: {"letter": letter} for letter in LETTERS},
         "generated": {
             "jc": {"defaults": ["jc_schema", "_self_"]},
@@ -1772,6 +2056,8 @@ def register() -> None:
             "flow": FlowChart,
             # for demonstrations that scatter: what a wiggly chart would learn by heart are their starts
             "smooth": FlowChart(length_scales=[1.4, 2.8]),
+            # that of Rana et al. 2020 and Sec. 6.4.1: their data have half the size
+            "euclideanizing": FlowChart(features=200, length_scales=[0.9], log_scale_cap=5.0),
             "injective_vae": InjectiveVaeChart,
             "injective_vae_flow": InjectiveVaeChart(code_flow=FlowChart()),
         },
@@ -1780,6 +2066,12 @@ def register() -> None:
             "potential_schema": PotentialField,
             "line_integral_schema": LineIntegralField,
             "velocity_network_schema": VelocityNetworkField,
+            "seds_schema": SedsField,
+            "euclideanizing_flow_schema": EuclideanizingFlowField,
+            "imitation_flow_schema": ImitationFlowField,
+            "elcd_schema": ElcdField,
+            "movement_primitive_schema": MovementPrimitiveField,
+            "custom_schema": CustomField,
         },
         "regulariser": {
             "none": NoRegulariser,
@@ -1791,9 +2083,25 @@ def register() -> None:
         "time_law": {"none": NoTimeLaw, "learned": LearnedTimeLaw},
         "training": {
             "trajectory": TrajectoryTraining,
+            # one recording, or a few alike: what is to be learned beside it is to come back, from far
+            "recording": TrajectoryTraining(
+                steps=1500,
+                mixing=1.0,
+                start_noise=0.5,
+                starts=8,
+                haste_weight=1.0,
+                surroundings=1.0,
+                weight_penalty=1e-4,
+            ),
             "scattered": TrajectoryTraining(steps=300, mixing=1.0, start_noise=0.1, weight_penalty=1e-2),
             "velocity": VelocityTraining,
+            # behind a flow, longer training fits how fast each demonstration was, and bends the paths between them
+            "velocity_behind_flow": VelocityTraining(steps=1500, learning_rate=2e-3, batch_points=256),
+            # few parameters, of different kinds
+            "seds": VelocityTraining(steps=1500, learning_rate=2e-2, batch_points=512),
             "adjoint": AdjointTraining,
+            "likelihood": LikelihoodTraining,
+            "closed_form": ClosedFormTraining,
         },
         "arm": {"panda": PandaArm, "planar_2dof": PlanarArm, "urdf": UrdfArm},
         "obstacle": {
@@ -1810,6 +2118,7 @@ def register() -> None:
         "evaluation": {"heldout": EvaluationConfig, "peers": EvaluationConfig(protocol=Protocol.peers)},
         "dataset": {
             "folder": FolderDataset(name="folder"),
+            "mmm_schema": MmmDataset,
             "lasa_schema": LasaDataset,
             "lasa_pose_schema": LasaPoseDataset,
             "robotasks9_schema": RoboTasks9Dataset,
@@ -1822,6 +2131,7 @@ def register() -> None:
             "panda_reach_joint_schema": PandaReachJointDataset,
             "panda_pouring_joint_schema": PandaPouringJointDataset,
             "panda_circle_joint_schema": PandaCircleJointDataset,
+            "panda_grasp_and_drop_schema": GraspAndDropDataset,
             "planar_s_curve_schema": PlanarSCurveDataset,
         },
     }

@@ -10,6 +10,7 @@ import torch
 from torch import nn
 
 from geomotion import config as schema
+from geomotion.baseline_models import build_anchored
 from geomotion.baselines.unconstrained import UnconstrainedLineIntegral
 from geomotion.baselines.velocity_network import VelocityNetwork
 from geomotion.dynamics.charts import AnchoredChart, ComposedChart, IdentityChart, ScalingChart, TurnedChart
@@ -33,7 +34,7 @@ from geomotion.dynamics.regularisers import (
 from geomotion.dynamics.time_law import ConditionalTimeLaw, SplineTimeLaw
 from geomotion.errors import CorruptArtefact, InvalidSetting
 from geomotion.files import write_tensors
-from geomotion.lie.poses import PoseCoordinates
+from geomotion.lie.poses import POSE_DIM, PoseCoordinates
 from geomotion.networks.coupling import CouplingFlow
 from geomotion.networks.mlp import MLP, JacobianRoot, SkewMatrix
 from geomotion.networks.spline_flow import SplineFlow
@@ -41,6 +42,7 @@ from geomotion.training.data import Geometry
 
 BY_CONSTRUCTION = "this field contracts by construction; its rate is at least field.min_rate_per_duration"
 UNCONSTRAINED = "this field has no negative definite matrix, which alone ε belongs to"
+JOINT_CHANNEL = "joints_rad"
 FORMAT = 2  # of the model file; raised when older files can no longer be read
 
 
@@ -73,7 +75,7 @@ class Skill:
         state_channels: Channels of the demonstrations that make up the state.
         train_demos: Numbers of the demonstrations it was fitted to.
         test_demos: Numbers of those that were held out.
-        pose: What turns poses into states, where these are poses.
+        pose: What turns poses into states, or into their last coordinates, where these are or have poses.
     """
 
     field: ChartedField
@@ -88,6 +90,13 @@ class Skill:
     def goal(self) -> torch.Tensor:
         """Where the demonstrations end, shape (D,) [m], in the model's precision."""
         return torch.tensor(self.geometry.goal, dtype=next(self.field.parameters()).dtype)
+
+    @property
+    def joints(self) -> int:
+        """How many of the first coordinates of a state are joint positions [rad]."""
+        if self.state_channels[0] != JOINT_CHANNEL:
+            return 0
+        return len(self.geometry.goal) - self.geometry.context - (POSE_DIM if self.pose is not None else 0)
 
 
 def build(config: ModelConfig, geometry: Geometry) -> ChartedField:
@@ -116,6 +125,11 @@ def build(config: ModelConfig, geometry: Geometry) -> ChartedField:
                 return ChartedField(anchored, field, geometry.duration_s, law, transverse)
             case _ if not isinstance(config.time_law, schema.NoTimeLaw):
                 raise InvalidSetting("time_law", "learned", "none, but for field=linear and field=potential")
+            case schema.AnchoredField() as anchored_field:
+                _refuse_regulariser(config.regulariser, UNCONSTRAINED)
+                _refuse_conditions(context)
+                around_goal = AnchoredChart(chart, torch.tensor(geometry.goal))
+                return ChartedField(around_goal, build_anchored(anchored_field, dim), geometry.duration_s)
             case schema.VelocityNetworkField() as network:
                 _refuse_regulariser(config.regulariser, UNCONSTRAINED)
                 _refuse_conditions(context)
@@ -316,7 +330,7 @@ def load_parts(path: Path) -> tuple[Skill, Mapping[str, Any] | None]:
         config = _model_config(document["config"])
         field = build(config, geometry)
         field.load_state_dict(document["parameters"])
-    except CorruptArtefact:
+    except (CorruptArtefact, InvalidSetting):
         raise
     except Exception as error:  # torch reports damage by many types
         raise CorruptArtefact(path, "this model file cannot be read") from error
@@ -347,6 +361,8 @@ def _component(document: Mapping[str, Any]) -> Any:
     kinds: Sequence[type] = (
         schema.IdentityChart, schema.FlowChart, schema.InjectiveVaeChart,
         schema.LinearField, schema.PotentialField, schema.LineIntegralField, schema.VelocityNetworkField,
+        schema.SedsField, schema.EuclideanizingFlowField, schema.ImitationFlowField, schema.ElcdField,
+        schema.MovementPrimitiveField, schema.CustomField,
         schema.NoRegulariser, schema.ConstantRegulariser, schema.StateIndependentRegulariser,
         schema.StateDependentRegulariser, schema.EigenvalueRegulariser,
         schema.NoTimeLaw, schema.LearnedTimeLaw,
@@ -356,7 +372,7 @@ def _component(document: Mapping[str, Any]) -> Any:
     for name, enum in (
         ("activation", schema.Activation), ("base_point", schema.BasePoint),
         ("base_velocity", schema.BaseVelocity), ("integrator", schema.Integrator),
-        ("jacobian", schema.JacobianForm),
+        ("jacobian", schema.JacobianForm), ("drift", schema.LatentDrift),
     ):  # fmt: skip
         if name in values:
             values[name] = enum(values[name])
@@ -364,4 +380,4 @@ def _component(document: Mapping[str, Any]) -> Any:
 
 
 def _value(document: Any) -> Any:
-    return _component(document) if isinstance(document, Mapping) else document
+    return _component(document) if isinstance(document, Mapping) and "kind" in document else document

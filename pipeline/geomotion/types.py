@@ -1,10 +1,13 @@
 """Shape names used in every signature of the library (checked by beartype in the tests)."""
 
+from collections.abc import Sequence
+
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 __all__ = [
     "Bool",
+    "Curves",
     "Float",
     "Int",
     "Latent",
@@ -24,3 +27,4 @@ Matrix = Float[Tensor, "*batch D D"]
 States = Float[Tensor, "point D"]
 Times = Float[Tensor, " time"]  # [s], increasing
 Trajectories = Float[Tensor, "*batch time D"]
+Curves = Sequence[Float[Tensor, "..."]]  # one entry for each demonstration

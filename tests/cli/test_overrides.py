@@ -20,6 +20,9 @@ CHOICES = {choice for _, choice in OPTIONS}
 
 NEEDED = {  # what has no default
     "dataset=folder": ["dataset.root=recordings"],
+    "dataset=mmm": ["dataset.path=walk.xml"],
+    "experiment=thesis/fig_6_14": ["dataset.path=walk.xml"],
+    "experiment=thesis/fig_6_15": ["dataset.path=walk.xml"],
     "dataset=robotasks9/other": ["dataset.task=navigation", "dataset.root=recordings"],
     "dataset=robotasks9_joint/other": ["dataset.task=navigation", "dataset.root=recordings"],
     "obstacle=sphere": ["obstacle.centre_m=[0,0]", "obstacle.radius_m=1"],

@@ -80,6 +80,25 @@ def test_the_same_study_again_in_one_process_reuses_every_cell_and_its_table(toy
     assert "train: done" not in again.err and "evaluate: done" not in again.err and "study: done" not in again.err
 
 
+def test_a_part_of_the_cells_elsewhere_takes_over_what_this_folder_has(toy, here, folder, tmp_path):
+    ncds, _, *settings = study(FIGURES, "study.shards=2", "study.shard=1")
+    elsewhere = (f"tracking.root={tmp_path}/runs", f"tracking.merge=[{folder}/runs]")
+    part = here(ncds, "compare", *settings, *elsewhere).done()
+    assert [cell["variant"] for cell in part.document["cells"]] == ["thesis"]
+    assert "train: taken over" in part.err and "evaluate: taken over" in part.err
+    assert scores_of(part, "thesis") == scores_of(toy, "thesis")
+
+
+def test_every_method_starts_from_the_same_states(toy):
+    with np.load(toy.artefact("study", "initial_conditions.npz")) as kept:
+        starts = kept["letters/j, seed 0/rollout_0"]
+    for variant in ("network", "thesis"):
+        (cell,) = [cell for cell in toy.document["cells"] if cell["variant"] == variant]
+        with np.load(Path(cell["stages"]["evaluate"]["folder"]) / "evaluation.npz") as behind:
+            np.testing.assert_array_equal(behind["rollout_0"][:1], starts)
+    assert not [note for note in toy.document["study"]["notes"] if "other starts" in note]
+
+
 def test_a_failing_cell_is_named_and_the_others_go_on(here, without_shape_checks):
     variants = (VARIANTS[0], "{label: diverging, overrides: ['field=mlp','training.learning_rate=1e30']}")
     answer = here(*study(variants=variants)).done(1)

@@ -6,12 +6,13 @@ import pytest
 import torch
 from torch.testing import assert_close
 
+from geomotion.lie.poses import PoseCoordinates
 from geomotion.obstacles.modulation import ModulatedField
 from geomotion.obstacles.solids import Sphere
 from geomotion.obstacles.ways import own_way
 from geomotion.policy.ports import Status
 
-from .skills import EMBEDDED, LINEAR, SIZE_M, ask, policy_of, pose_skill, skill_of, states_of
+from .skills import EMBEDDED, LINEAR, REFERENCE, SIZE_M, ask, policy_of, pose_skill, skill_of, states_of
 
 
 def measured(skill, states):
@@ -109,3 +110,18 @@ class TestStatus:
         assert answer["status"].tolist()[1] in (Status.outside, Status.undefined)
         assert answer["status"].tolist()[2] == Status.undefined
         assert answer["angular_velocity_rad_per_s"].isfinite().all()
+
+
+def test_joints_and_the_pose_that_carries_them_have_their_own_velocities_and_meet_no_balls():
+    pose = PoseCoordinates(torch.tensor(REFERENCE), lever_m=1.0)
+    skill = skill_of(EMBEDDED, 9, ("joints_rad", "pose_m"), pose)
+    states = states_of(9)
+    position, orientation = pose.to_pose(states[:, 3:])
+    policy = policy_of(skill)
+    answer = ask(policy, joints_rad=states[:, :3], position_m=position, orientation_wxyz=orientation)
+    velocity = skill.field(states)
+    twist = pose.twist(states[:, 3:], velocity[:, 3:])
+    assert_close(answer["joint_velocity_rad_per_s"], velocity[:, :3], rtol=1e-4, atol=1e-5)
+    assert_close(answer["velocity_m_per_s"], twist.velocity, rtol=1e-4, atol=1e-5)
+    assert_close(answer["angular_velocity_rad_per_s"], twist.omega, rtol=1e-4, atol=1e-5)
+    assert not any(one.name.startswith("obstacle") for one in policy.inputs)

@@ -1,4 +1,5 @@
 import json
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,26 @@ def scores(dtwd: float | None, inside: float) -> dict:
 
 def verdicts(path: Path, found: dict) -> list[str]:
     return [row["verdict"] for row in check(CheckConfig(str(path)), found).document["rows"]]
+
+
+def test_a_file_for_continuous_integration_names_what_got_worse_and_why_that_counts(baseline, tmp_path):
+    report = tmp_path / "checks" / "letters.xml"
+    check(CheckConfig(str(baseline), junit=str(report)), scores(1.2, 100.0))
+    suite = ET.parse(report).getroot()
+    assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
+    worse, fine = suite
+    assert worse.get("name") == "train.dtwd_per_point" and "other processors" in worse.find("failure").text
+    assert fine.find("failure") is None
+
+
+def test_a_claim_that_is_lost_is_worse(tmp_path):
+    path = tmp_path / "baseline.json"
+    proven = {"claim": "by_construction", "rate_per_s": 0.5}
+    check(CheckConfig(str(path), update=True), scores(1.0, 100.0), proven)
+    assert check(CheckConfig(str(path)), scores(1.0, 100.0), proven).passed
+    lost = check(CheckConfig(str(path)), scores(1.0, 100.0), {"claim": "measured_only", "rate_per_s": None})
+    verdicts_of = {row["name"]: row["verdict"] for row in lost.document["rows"]}
+    assert verdicts_of["certificate.proven"] == "worse" and verdicts_of["certificate.rate_per_s"] == "missing"
 
 
 @pytest.mark.parametrize(

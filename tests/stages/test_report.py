@@ -123,6 +123,7 @@ def stages(tmp_path):
             "duration_s": 2.0,
             "points": 50,
             "outcome": "reached",
+            "unit": ["mm", 1000.0],
             "distance_to_goal_m": 0.0015,
         }
         write(folders["rollout"] / "rollouts.json", {"rollouts": [row]})

@@ -1,9 +1,11 @@
+import numpy as np
 import pytest
 
 from geomotion.config import ReferenceConfig, ReferenceRow, StudyColumn, StudyConfig, StudyVariant
 from geomotion.errors import InvalidSetting
-from geomotion.stages.study_cells import compose_cells
-from geomotion.stages.study_table import aligned_table, lines, markdown_table, table_document
+from geomotion.stages.initial_conditions import initial_conditions
+from geomotion.stages.study_cells import Cell, compose_cells
+from geomotion.stages.study_table import aligned_table, bootstrap_interval, lines, markdown_table, table_document
 
 
 def study(**changes) -> StudyConfig:
@@ -20,7 +22,8 @@ def study(**changes) -> StudyConfig:
 
 def scores(dtw: float | None, **others: float) -> dict:
     values = {"train.dtw": dtw, **{name.replace("__", "."): value for name, value in others.items()}}
-    return {name: {"value": value, "unit": "mm", "spread": 9.0} for name, value in values.items()}
+    common = {"unit": "mm", "spread": 9.0, "statistic": "mean", "values": []}
+    return {name: common | {"value": value} for name, value in values.items()}
 
 
 def test_a_row_for_each_variant_with_the_numbers_of_others_beside_it():
@@ -39,8 +42,37 @@ def test_a_row_for_each_variant_with_the_numbers_of_others_beside_it():
 def test_several_seeds_are_averaged_and_their_spread_is_shown():
     found = {("letters/j", "plain"): [scores(1.0), scores(3.0)], ("letters/j", "ours"): [scores(1.0), scores(None)]}
     _, plain, ours = lines(table_document(study(seeds=[0, 1], reference=None), found, []))
-    assert plain[2:] == ["2 ± 1", "–"]
+    assert plain[2:] == ["2 ± 1 [1, 3]", "–"]
     assert ours[2:] == ["not finite", "–"]
+
+
+def test_the_interval_is_that_of_a_mean_where_seeds_are_many():
+    values = np.random.default_rng(3).normal(5.0, 2.0, 400)
+    interval = bootstrap_interval([{"statistic": "mean", "value": value, "values": [value]} for value in values])
+    expected = values.mean() + np.array([-1.96, 1.96]) * values.std() / 20
+    np.testing.assert_allclose(interval, expected, atol=0.03)
+
+
+def test_what_each_seed_judged_widens_the_interval_and_a_maximum_has_no_such_values():
+    one = {"statistic": "mean", "value": 2.0, "values": [1.0, 3.0]}
+    low, high = bootstrap_interval([one, one])
+    assert low == 1 and high == 3
+    assert bootstrap_interval([one | {"statistic": "max"}] * 2) == [2, 2]
+    assert bootstrap_interval([one]) is None
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.1])
+def test_methods_that_start_elsewhere_are_named(tmp_path, moved):
+    cells = [Cell(name, "letters/j", 0, []) for name in ("plain", "ours")]
+    for number, cell in enumerate(cells):
+        (tmp_path / cell.variant).mkdir()
+        path = np.zeros((5, 2)) + number * moved
+        path[1:] += number  # where motions go is their own matter
+        np.savez(tmp_path / cell.variant / "evaluation.npz", rollout_0=path, goal_starts=np.ones((4, 2)))
+    starts, differing = initial_conditions([(cell, tmp_path / cell.variant) for cell in cells])
+    np.testing.assert_array_equal(starts["letters/j, seed 0/rollout_0"], [[0, 0]])
+    assert starts["letters/j, seed 0/goal_starts"].shape == (4, 2)
+    assert [one.partition(",")[0] for one in differing] == (["ours"] if moved else [])
 
 
 def test_references_are_left_out_where_none_applies():
@@ -54,7 +86,9 @@ def test_failures_are_listed():
     assert "failed: plain, letters/j, seed 0: the reason" in aligned_table(table)
 
 
-@pytest.mark.parametrize("changes", [{"datasets": []}, {"seeds": [1, 1]}, {"jobs": 0}, {"variants": []}])
+@pytest.mark.parametrize(
+    "changes", [{"datasets": []}, {"seeds": [1, 1]}, {"jobs": 0}, {"shards": 2, "shard": 2}, {"variants": []}]
+)
 def test_a_study_needs_one_or_more_of_everything_once(changes):
     with pytest.raises(InvalidSetting, match=r"study\."):
         study(**changes)

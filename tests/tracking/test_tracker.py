@@ -1,11 +1,20 @@
 import multiprocessing
+import shutil
 import signal
 from pathlib import Path
 
 import pytest
 
 from geomotion.config import TrackingConfig
-from geomotion.errors import CorruptArtefact, DiskFull, Interrupted, MissingArtefact, MissingRun, StoreUnavailable
+from geomotion.errors import (
+    CorruptArtefact,
+    DiskFull,
+    Interrupted,
+    MissingArtefact,
+    MissingData,
+    MissingRun,
+    StoreUnavailable,
+)
 from geomotion.files import atomic
 from geomotion.tracking import Artefacts, Stage, Tracker, store
 from geomotion.tracking.artefacts import digest_of, run_key
@@ -60,6 +69,28 @@ def test_a_stage_that_reads_outside_is_repeated_but_kept_once(config):
     first, second = execute(config, stage, {}), execute(config, stage, {})
     assert work.calls == 2
     assert first.run_id == second.run_id
+
+
+class TestMerging:
+    def test_what_another_folder_finished_is_taken_over_with_its_curves(self, config, tmp_path):
+        elsewhere, here = Counting(), Counting()
+        done = execute(config, Stage("train", elsewhere), {"seed": 1})
+        moved = tmp_path / "from another machine"
+        shutil.move(config.root, moved)
+        own = TrackingConfig(root=str(tmp_path / "own"), merge=[str(moved)])
+        found = execute(own, Stage("train", here), {"seed": 1})
+        assert (elsewhere.calls, here.calls) == (1, 0)
+        assert found.run_id != done.run_id and found.digest == done.digest
+        assert found.path("value.txt").read_text() == str({"seed": 1})
+        client = Tracker(own).client
+        assert [point.value for point in client.get_metric_history(found.run_id, "loss")] == [0.5]
+        assert execute(own, Stage("train", here), {"seed": 1}).run_id == found.run_id
+        execute(own, Stage("train", here), {"seed": 2})
+        assert here.calls == 1
+
+    def test_a_folder_without_results_is_named(self, tmp_path):
+        with pytest.raises(MissingData, match=r"tracking\.merge"):
+            Tracker(TrackingConfig(root=str(tmp_path / "own"), merge=[str(tmp_path / "none")]))
 
 
 def test_the_key_depends_on_configuration_and_inputs_only():

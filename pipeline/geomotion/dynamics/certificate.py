@@ -94,7 +94,7 @@ class Certificate:
 
 
 def certify(model: ChartedField, states: States) -> Certificate:
-    """The certificate of a model.
+    """The certificate of a model; a field without a proof here says by its attribute `claim` what its method claims.
 
     Args:
         model: The trained field.
@@ -110,7 +110,7 @@ def certify(model: ChartedField, states: States) -> Certificate:
             _proof(field) + _about_time(model) + place,
             overshoot,
         )
-    reason = NOT_A_JACOBIAN if isinstance(model.field, LineIntegralField) else UNCONSTRAINED
+    reason = NOT_A_JACOBIAN if isinstance(field, LineIntegralField) else getattr(field, "claim", UNCONSTRAINED)
     metric = "Euclidean metric of the chart's coordinates"
     return Certificate(Claim.measured_only, metric, None, reason + place, overshoot)
 

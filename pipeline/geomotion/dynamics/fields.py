@@ -33,6 +33,17 @@ class SolvableField(VectorField, Protocol):
 
 
 @runtime_checkable
+class Plan(SolvableField, Protocol):
+    """What knows trajectories, but no velocities of states: a call is refused.
+
+    Attributes:
+        is_plan: Says so.
+    """
+
+    is_plan: bool
+
+
+@runtime_checkable
 class SkillField(VectorField, Protocol):
     """A field whose first coordinates are those of a skill; all others, z_e, lead back to where they vanish.
 

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import torch
 from torchdiffeq import odeint
 
-from geomotion.dynamics.fields import ChartedField, SolvableField, TimedField, VectorField
+from geomotion.dynamics.fields import ChartedField, Plan, SolvableField, TimedField, VectorField
 from geomotion.errors import InvalidSetting
 from geomotion.types import Float, State, Tensor, Times, Trajectories
 
@@ -109,7 +109,7 @@ def judge(
     for as long again as the rollout took), moving. A goal or region that is not given is not judged.
     """
     last = states[:, -1]
-    drift = field(last).norm(dim=-1) * (times[-1] - times[0])
+    drift = _speed_at_end(field, states, times) * (times[-1] - times[0])
     verdicts = {RolloutStatus.diverged: ~states.isfinite().all(dim=(-1, -2))}
     if goal is not None:
         verdicts[RolloutStatus.reached] = (last - goal).norm(dim=-1) <= goal_tolerance
@@ -120,6 +120,15 @@ def judge(
     first_true = torch.stack(list(verdicts.values())).int().argmax(dim=0)
     options = tuple(verdicts)
     return tuple(options[index] for index in first_true.tolist())
+
+
+def _speed_at_end(field: VectorField, states: Trajectories, times: Times) -> Float[Tensor, " start"]:
+    speeds: Tensor
+    if isinstance(field, ChartedField) and isinstance(field.field, Plan):
+        speeds = (states[:, -1] - states[:, -2]).norm(dim=-1) / (times[-1] - times[-2])
+        return speeds
+    speeds = field(states[:, -1]).norm(dim=-1)
+    return speeds
 
 
 class _StepSizeCollapsed(Exception):

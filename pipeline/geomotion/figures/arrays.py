@@ -111,6 +111,25 @@ class GoalStarts:
 
 
 @dataclass(frozen=True)
+class LatentPlane:
+    """A plane of the latent space of a skill of few dimensions.
+
+    Attributes:
+        demonstrated: A demonstration there, shape (T, 2).
+        paths: Motions from its start and from others, shape (motion, T, 2).
+        points: Of a square grid, shape (k·k, 2).
+        velocity: The latent field at these, per time unit.
+        is_skill: Whether each of the two coordinates is one of the skill's.
+    """
+
+    demonstrated: Array
+    paths: Array
+    points: Array
+    velocity: Array
+    is_skill: tuple[bool, bool]
+
+
+@dataclass(frozen=True)
 class EvaluationArrays:
     """All that was computed; None where it does not apply."""
 
@@ -120,6 +139,8 @@ class EvaluationArrays:
     nearby: Nearby | None
     region: Region | None
     goal_starts: GoalStarts | None
+    latent: LatentPlane | None = None
+    names: tuple[str, ...] = ()  # of the coordinates, with units; empty where they are positions [m]
 
     @property
     def dim(self) -> int:
@@ -155,6 +176,8 @@ def from_arrays(arrays: Arrays) -> EvaluationArrays:
         _nearby(arrays),
         _region(arrays),
         _goal_starts(arrays),
+        _latent(arrays),
+        tuple(arrays["state_names"].tolist()) if _has(arrays, "state_names") else (),
     )
 
 
@@ -212,6 +235,14 @@ def _region(arrays: Arrays) -> Region | None:
     if not _has(arrays, "region_hull", "region_rollouts", "region_inside"):
         return None
     return Region(arrays["region_hull"], arrays["region_rollouts"], arrays["region_inside"].astype(bool))
+
+
+def _latent(arrays: Arrays) -> LatentPlane | None:
+    if not _has(arrays, "latent_demonstrated", "latent_paths", "latent_points", "latent_velocity"):
+        return None
+    first, second = arrays["latent_is_skill"].tolist()
+    shown = arrays["latent_demonstrated"], arrays["latent_paths"]
+    return LatentPlane(*shown, arrays["latent_points"], arrays["latent_velocity"], (first, second))
 
 
 def _goal_starts(arrays: Arrays) -> GoalStarts | None:

@@ -172,6 +172,8 @@ def _axis_label(channel: str, axis: int, demonstrations: Demonstrations) -> str:
     width = demonstrations[0].channels[channel].shape[1]
     if channel == "position_m" and width > 3:
         return state_label(axis)
+    if channel == "joints_rad" and demonstrations.joint_names:
+        return f"{demonstrations.joint_names[axis].removesuffix('_joint')} [rad]"
     name = column_names(channel, width)[axis]
     short = {"position_m": "", "orientation_wxyz": "q", "joints_rad": "joint ", "direction_xyz": "direction "}.get(
         channel, ""

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from geomotion.figures.arrays import Arrays, EvaluationArrays, from_arrays
 from geomotion.figures.eigenvalues import figure_eigenvalues
 from geomotion.figures.goals import figure_goal_starts
+from geomotion.figures.latent_paths import figure_latent_paths
 from geomotion.figures.motion import figure_motion
 from geomotion.figures.nearby import figure_nearby
 from geomotion.figures.region import figure_region
@@ -21,6 +22,7 @@ PREFIXES = {
     "nearby": ("nearby_",),
     "region": ("region_",),
     "goal_starts": ("goal",),
+    "latent_paths": ("latent_",),
 }
 
 
@@ -31,6 +33,8 @@ def figures(data: EvaluationArrays, rate_per_s: float | None) -> dict[str, Calla
         chosen["eigenvalues"] = figure_eigenvalues
     if data.nearby is not None:
         chosen["nearby"] = partial(figure_nearby, rate_per_s=rate_per_s)
+    if data.latent is not None:
+        chosen["latent_paths"] = figure_latent_paths
     if data.region is not None:
         chosen["region"] = figure_region
     if data.dim == 2 and data.goal_starts is not None and not data.goal_starts.reached.all():

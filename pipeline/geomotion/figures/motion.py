@@ -60,7 +60,7 @@ def draw_goal(ax: Axes, goal: Array) -> Axes:
     return ax
 
 
-def draw_coordinate(ax: Axes, judged: Sequence[Judged], axis: int) -> Axes:
+def draw_coordinate(ax: Axes, judged: Sequence[Judged], axis: int, name: str | None = None) -> Axes:
     """Draw one coordinate of demonstrations and rollouts over time."""
     for item in judged:
         demonstrated, rolled = (":", DASHES) if item.held_out else ("-", "-")
@@ -70,7 +70,7 @@ def draw_coordinate(ax: Axes, judged: Sequence[Judged], axis: int) -> Axes:
     # a rollout that diverges may leave the axes, but not shrink everything else
     values = np.concatenate([item.demonstration[:, axis] for item in judged])
     margin = DIVERGENCE_MARGIN * (float(np.ptp(values)) or 1.0)
-    ax.set(ylabel=state_label(axis), ylim=(values.min() - margin, values.max() + margin))
+    ax.set(ylabel=name or state_label(axis), ylim=(values.min() - margin, values.max() + margin))
     ax.margins(x=0.01)
     return ax
 
@@ -126,7 +126,7 @@ def _figure_coordinates(data: EvaluationArrays) -> Figure:
     grid = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False)
     for axis, ax in enumerate(grid.flat):
         if axis < data.dim:
-            draw_coordinate(ax, data.judged, axis)
+            draw_coordinate(ax, data.judged, axis, data.names[axis] if data.names else None)
         else:
             ax.set_axis_off()
     for ax in grid[-1]:

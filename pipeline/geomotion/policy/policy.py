@@ -48,6 +48,7 @@ class Policy(nn.Module):
         self.scale_m = plain.geometry.scale_m
         self.dim = plain.field.dim - plain.geometry.context
         self.channels = plain.state_channels
+        self.joints = plain.joints if self.pose is not None else 0  # in front of a pose
         self.embedded, self.decoder = _embedded(plain), _decoder(plain)
         self.inputs = tuple(self._inputs())
         self.outputs = tuple(self._outputs())
@@ -78,6 +79,8 @@ class Policy(nn.Module):
             return x, torch.ones_like(x[..., 0], dtype=torch.bool)
         length = given[ports.ORIENTATION].norm(dim=-1, keepdim=True)
         x = self.pose.to_vector(given[ports.POSITION], given[ports.ORIENTATION] / length)
+        if self.joints:
+            x = torch.cat([given[ports.JOINTS], x], dim=-1)
         return x, ((length - 1).abs() < ROTATION_TOLERANCE)[..., 0]
 
     def _velocity(self, x: State, given: Mapping[str, Tensor]) -> tuple[Tensor, Velocity]:
@@ -115,8 +118,10 @@ class Policy(nn.Module):
         """What is commanded: ẋ, or the velocity of the position and the angular one; the first clear of the ball."""
         position, moving, turning = x, velocity, tuple[Tensor, ...]()
         if self.pose is not None:
-            twist = self.pose.twist(x, velocity)
+            twist = self.pose.twist(x[..., self.joints :], velocity[..., self.joints :])
             position, moving, turning = x[..., :3], twist.velocity, (twist.omega,)
+            if self.joints:
+                return velocity[..., : self.joints], moving, *turning
         if ports.OBSTACLE_RADIUS in given:
             place = given[ports.OBSTACLE_CENTRE], given[ports.OBSTACLE_RADIUS], given[ports.OBSTACLE_VELOCITY]
             moving = TensorSphere(*place).modulate(position, moving, self.avoidance)
@@ -124,7 +129,8 @@ class Policy(nn.Module):
 
     def _inputs(self) -> list[Input]:
         if self.pose is not None:
-            found = [Input(ports.POSITION, 3, "m"), Input(ports.ORIENTATION, 4, "1")]
+            joints = [Input(ports.JOINTS, self.joints, "rad")] if self.joints else []
+            found = [*joints, Input(ports.POSITION, 3, "m"), Input(ports.ORIENTATION, 4, "1")]
         else:
             name = ports.JOINTS if self.channels == (ports.JOINTS,) else ports.STATE
             found = [Input(name, self.dim, ", ".join(dict.fromkeys(CHANNEL_UNITS[one] for one in self.channels)))]
@@ -133,7 +139,8 @@ class Policy(nn.Module):
         if self.field.time_law is not None:
             found.append(Input(ports.ELAPSED, 1, "s"))
         place = 3 if self.pose is not None else self.dim
-        if place > 1 and (self.pose is not None or self.channels == (ports.POSITION,)):
+        is_body = self.pose is not None and not self.joints  # what carries joints is not all that must keep clear
+        if place > 1 and (is_body or self.channels == (ports.POSITION,)):
             still = (0.0,) * place
             found.append(Input(ports.OBSTACLE_CENTRE, place, "m", still))
             found.append(Input(ports.OBSTACLE_RADIUS, 1, "m", (0.0,)))
@@ -145,7 +152,8 @@ class Policy(nn.Module):
 
     def _outputs(self) -> list[Output]:
         if self.pose is not None:
-            found = [Output(ports.VELOCITY, 3, "m/s"), Output(ports.OMEGA, 3, "rad/s")]
+            joints = [Output(ports.JOINT_VELOCITY, self.joints, "rad/s")] if self.joints else []
+            found = [*joints, Output(ports.VELOCITY, 3, "m/s"), Output(ports.OMEGA, 3, "rad/s")]
         elif self.channels == (ports.JOINTS,):
             found = [Output(ports.JOINT_VELOCITY, self.dim, "rad/s")]
         else:

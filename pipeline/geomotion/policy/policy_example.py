@@ -22,6 +22,8 @@ for tick in range(round(card["example"]["duration_s"] / PERIOD_S)):
     times_s.append(time.perf_counter() - begun)
     status = max(status, answer["status"][0])  # 0: ok; 1: outside the demonstrated range; 2: no velocity
     asked[state] += PERIOD_S * next(iter(answer.values()))  # a robot moves by itself: here it follows exactly
+    if "orientation_wxyz" in asked and state != "position_m":  # joints come first
+        asked["position_m"] += PERIOD_S * answer["velocity_m_per_s"]
     if "orientation_wxyz" in asked:  # q̇ = (0, ω) q / 2, with ω in the frame at rest
         (w, *v), half = asked["orientation_wxyz"][0], PERIOD_S * answer["angular_velocity_rad_per_s"][0] / 2
         turned = asked["orientation_wxyz"][0] + np.array([-half @ v, *(half * w + np.cross(half, v))], np.float32)

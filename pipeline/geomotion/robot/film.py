@@ -31,6 +31,21 @@ SMALLEST_VIEW_M = 0.05
 
 
 @dataclass(frozen=True)
+class Light:
+    """A light far away, and what comes from everywhere.
+
+    Attributes:
+        direction: Towards the light, of any length.
+        ambient: Share that comes from everywhere.
+        diffuse: Share that matt surfaces give back of the other.
+    """
+
+    direction: tuple[float, float, float] = (1.0, -1.0, 2.0)
+    ambient: float = 0.6  # these are PyBullet's own
+    diffuse: float = 0.35
+
+
+@dataclass(frozen=True)
 class Camera:
     """Where the scene is seen from; the default shows the Panda, a table and the space in front.
 
@@ -40,6 +55,7 @@ class Camera:
         view_deg: Vertical angle of view [deg].
         width: [pixel].
         height: [pixel].
+        light: By what the scene is lit.
     """
 
     eye_m: tuple[float, float, float] = (1.5, -1.2, 0.85)
@@ -47,6 +63,7 @@ class Camera:
     view_deg: float = 36.0
     width: int = 320
     height: int = 240
+    light: Light = field(default_factory=Light)
 
     @classmethod
     def around(cls, moved_m: Float[np.ndarray, "point 3"], resting_m: Float[np.ndarray, "other 3"]) -> "Camera":
@@ -70,7 +87,9 @@ class Camera:
             self.height,
             view,
             projection,
-            lightDirection=[1, -1, 2],
+            lightDirection=self.light.direction,
+            lightAmbientCoeff=self.light.ambient,
+            lightDiffuseCoeff=self.light.diffuse,
             shadow=0,
             renderer=client.ER_TINY_RENDERER,
         )

@@ -106,6 +106,22 @@ def solve_path(
     return best
 
 
+def solve_path_from(
+    start_rad: Float[np.ndarray, " joint"],
+    positions_m: Float[np.ndarray, "pose 3"],
+    orientations_wxyz: Float[np.ndarray, "pose 4"],
+    frame: panda.Frame = "grasp_target",
+) -> JointPath:
+    """A path of poses as :func:`solve_path` has it, on the branch of joint positions that are given [rad].
+
+    Raises:
+        ShapeMismatch: If there are no poses, or not one orientation per position.
+        InvalidSetting: If a number is not finite or a quaternion is not of unit length.
+    """
+    targets, chain = pose_transforms(positions_m, orientations_wxyz), panda_chain(frame)
+    return _follow(chain, targets, search(chain, targets[0], start_rad))
+
+
 def solve_pose(
     position_m: Float[np.ndarray, "3"],
     orientation_wxyz: Float[np.ndarray, "4"],
@@ -123,8 +139,7 @@ def solve_pose(
     Raises:
         InvalidSetting: If a number is not finite or the quaternion is not of unit length.
     """
-    targets, chain = pose_transforms(position_m[None], orientation_wxyz[None]), panda_chain(frame)
-    return judge(chain, targets, search(chain, targets[0], start_rad)[None])
+    return solve_path_from(start_rad, position_m[None], orientation_wxyz[None], frame)
 
 
 def _follow(chain: Chain, targets: Float[np.ndarray, "pose 4 4"], first: Float[np.ndarray, " joint"]) -> JointPath:

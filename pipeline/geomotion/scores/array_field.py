@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from geomotion.dynamics.fields import ChartedField
+from geomotion.dynamics.fields import ChartedField, Plan
 from geomotion.dynamics.injective import rollout_on_manifold
 from geomotion.dynamics.rollout import rollout
 from geomotion.types import Tensor
@@ -30,6 +30,11 @@ class ArrayField:
         self.begins_on_manifold = begins_on_manifold
         self.dtype = next(field.parameters()).dtype
         self._rollout_options = rollout_options
+
+    @property
+    def is_plan(self) -> bool:
+        """Whether it knows trajectories, but no velocities of states."""
+        return isinstance(self.field.field, Plan)
 
     def roll(
         self, starts: Float[np.ndarray, "start D"], times_s: Float[np.ndarray, " time"]

@@ -171,20 +171,20 @@ def _speeds(
 
 
 class Path:
-    """A curve in space, ready for queries.
+    """A curve in space or in joint space, ready for queries.
 
     Args:
-        points_m: In the order in which they are passed, with straight lines between them [m].
+        points: In the order in which they are passed, with straight lines between them [m or rad].
     """
 
-    def __init__(self, points_m: Float[np.ndarray, "point 3"]) -> None:
-        numbers = np.arange(len(points_m))
+    def __init__(self, points: Float[np.ndarray, "point D"]) -> None:
+        numbers = np.arange(len(points))
         between = np.linspace(0, numbers[-1], REFINED * numbers[-1] + 1)
-        self._tree = cKDTree(np.stack([np.interp(between, numbers, one) for one in points_m.T], axis=-1))
+        self._tree = cKDTree(np.stack([np.interp(between, numbers, one) for one in points.T], axis=-1))
 
-    def distances(self, positions_m: Float[np.ndarray, "time 3"]) -> Float[np.ndarray, " time"]:
-        """From positions to the nearest point of the path [m]; infinite where a position is not finite."""
-        is_finite = np.isfinite(positions_m).all(axis=1)
-        distances = np.full(len(positions_m), np.inf)
-        distances[is_finite] = self._tree.query(positions_m[is_finite])[0]
+    def distances(self, positions: Float[np.ndarray, "time D"]) -> Float[np.ndarray, " time"]:
+        """From positions to the nearest point of the path; infinite where a position is not finite."""
+        is_finite = np.isfinite(positions).all(axis=1)
+        distances = np.full(len(positions), np.inf)
+        distances[is_finite] = self._tree.query(positions[is_finite])[0]
         return distances

@@ -20,6 +20,8 @@ TITLES = {
     "goal": "Starts on a grid",
     "step": "Single integration steps, Table 6.3",
     "equilibrium": "Where the field comes to rest",
+    "returns": "Motions from starts that are off in every joint, distance to the demonstration (RMS of joints)",
+    "returns.claimed": "Motions from starts that are off in every joint, in the claimed metric",
     "pushes": "Motions pushed aside, distance to their undisturbed paths",
     "pushes.claimed": "Motions pushed aside, distance to the undisturbed motion in the claimed metric",
     "obstacles.contraction.true": "Contraction among obstacles, robot coordinates (measured, not proven)",

@@ -25,17 +25,20 @@ from geomotion.config import (
 from geomotion.demos import storage
 from geomotion.demos.demonstrations import Demonstrations, Trajectory
 from geomotion.demos.pose_vectors import BODY_STATES, POSE_CHANNEL, with_pose_vectors
+from geomotion.dynamics.embedded import EmbeddedField
 from geomotion.errors import InvalidSetting
 from geomotion.figures.evaluation import save_all
 from geomotion.figures.safety import save_safety_figures
 from geomotion.files import atomic, read_json, write_json
-from geomotion.lie.poses import PoseCoordinates
+from geomotion.lie.poses import POSE_DIM, PoseCoordinates
 from geomotion.models import Skill
 from geomotion.scores.array_field import ArrayField
 from geomotion.scores.contraction import judge_condition, judge_contraction
 from geomotion.scores.evaluation import Evaluation, Unit, combine
 from geomotion.scores.goal import judge_goal
 from geomotion.scores.grids import Box, bounding_box, sample_box
+from geomotion.scores.joints import ReturnProtocol, judge_joints, judge_returns
+from geomotion.scores.latent_plane import latent_plane
 from geomotion.scores.nearby import judge_nearby, nearby_starts
 from geomotion.scores.off_manifold import Separation, judge_off_manifold
 from geomotion.scores.paths import PosePath
@@ -56,6 +59,7 @@ __all__ = ["EvaluateConfig", "compute", "evaluate", "scores_table"]
 
 PEERS_TRIM_POINTS = 15
 PEERS_TRAIN_DEMOS = (0, 1, 2, 3, 4)
+POSE_NAMES = ("$x$ [m]", "$y$ [m]", "$z$ [m]", "turn about $x$ [m]", "turn about $y$ [m]", "turn about $z$ [m]")
 PICTURE_POINTS_PER_AXIS = 40  # of the velocity field
 DRAWN_STARTS = 40  # of motions in a safety region
 
@@ -163,7 +167,8 @@ def compute(
     return combine(
         [
             judge_reproduction([*trained, *heldout], state_unit(skill.state_channels)),
-            _poses(skill.pose, [*trained, *heldout]),
+            _poses(skill, [*trained, *heldout]),
+            _joints(field, skill, [*trained, *heldout], settings, proven_rate),
             judge_off_manifold(skill.field, [*trained, *heldout], _separation(skill)),
             _contraction(field, scene, settings, proven_rate),
             _region(field, scene, settings),
@@ -171,6 +176,7 @@ def compute(
             _goal(field, scene, settings, skill.goal.double().numpy()),
             _pushes(field, skill, heldout or trained, settings, proven_rate),
             _picture(field, scene),
+            _names(skill, demonstrations),
             judge_step_times(skill, demonstrations.select(skill.train_demos), settings.timed_steps),
         ]
     )
@@ -231,19 +237,38 @@ def _judged(field: ArrayField, demonstration: Trajectory, skill: Skill, is_train
     states = demonstration.state(skill.state_channels)
     time_s = demonstration.time_s - demonstration.time_s[0]
     velocities = demonstration.velocity(skill.state_channels)
-    predicted = field.velocity(states, time_s)
-    return Judged(time_s, states, velocities, field.roll(states[:1], time_s)[0], predicted, is_trained)
+    rollout = field.roll(states[:1], time_s)[0]
+    # a plan has no velocities but its own
+    predicted = np.gradient(rollout, time_s, axis=0) if field.is_plan else field.velocity(states, time_s)
+    return Judged(time_s, states, velocities, rollout, predicted, is_trained)
 
 
-def _poses(coordinates: PoseCoordinates | None, judged: Sequence[Judged]) -> Evaluation:
-    if coordinates is None:
+def _poses(skill: Skill, judged: Sequence[Judged]) -> Evaluation:
+    if skill.pose is None:
         return Evaluation()
-    path = partial(_path, coordinates)
+    path = partial(_path, skill.pose)
     return judge_poses([JudgedPoses(path(one.states), path(one.rollout), one.is_trained) for one in judged])
 
 
-def _path(coordinates: PoseCoordinates, vectors: NDArray[np.float64]) -> PosePath:
-    position, orientation = coordinates.to_pose(torch.as_tensor(vectors))
+def _joints(
+    field: ArrayField, skill: Skill, judged: Sequence[Judged], settings: EvaluationConfig, proven_rate: float | None
+) -> Evaluation:
+    if not skill.joints or field.is_plan:
+        return Evaluation()
+    returns, rate = settings.joint_returns, proven_rate if field.field.is_onto else None
+    protocol = ReturnProtocol(returns.count, returns.offset_rad, settings.seed)
+    trained = [one for one in judged if one.is_trained]
+    parts = [judge_joints(judged, skill.joints), judge_returns(field, trained, skill.joints, protocol, rate)]
+    if isinstance(latent := skill.field.field, EmbeddedField):
+        starts = np.repeat(trained[0].states[:1], returns.count, axis=0)
+        starts[:, : skill.joints] += protocol.offsets(skill.joints)
+        parts.append(latent_plane(field, trained[0], starts, latent.skill_dim))
+    return combine(parts)
+
+
+def _path(coordinates: PoseCoordinates, states: NDArray[np.float64]) -> PosePath:
+    """Poses of states, which end with their vectors."""
+    position, orientation = coordinates.to_pose(torch.as_tensor(states[..., -POSE_DIM:]))
     return PosePath(position.numpy(), orientation.numpy())
 
 
@@ -257,12 +282,18 @@ def _separation(skill: Skill) -> Separation:
         if coordinates is None:
             return {"distance": (unit.name, unit.per_state_unit * np.linalg.norm(states - others, axis=1))}
         apart_m, apart_rad = _path(coordinates, states).residuals(_path(coordinates, others))
-        return {"position_distance": ("mm", 1000 * apart_m), "orientation_distance": ("deg", np.degrees(apart_rad))}
+        apart = {"position_distance": ("mm", 1000 * apart_m), "orientation_distance": ("deg", np.degrees(apart_rad))}
+        if not skill.joints:
+            return apart
+        joints = np.sqrt(np.square((states - others)[:, : skill.joints]).mean(axis=1))
+        return apart | {"joint_distance": ("deg", np.degrees(joints))}
 
     return separation
 
 
 def _contraction(field: ArrayField, scene: Scene, settings: EvaluationConfig, proven_rate: float | None) -> Evaluation:
+    if field.is_plan:
+        return Evaluation(omitted={"contraction": "a plan has no velocity of a state, whose Jacobian could be taken"})
     grid = sample_box(scene.box, settings.contraction_grid_points, settings.seed)
     points = field.tensor(grid.points)
     place = {"grid_points": grid.points, "grid_shape": np.array(grid.shape, dtype=int)}
@@ -299,7 +330,7 @@ def _pushes(
     field: ArrayField, skill: Skill, judged: Sequence[Judged], settings: EvaluationConfig, proven_rate: float | None
 ) -> Evaluation:
     """Only of states that begin with a position in space."""
-    if BODY_STATES.get(skill.state_channels) != field.field.dim:
+    if BODY_STATES.get(skill.state_channels) != field.field.dim or field.is_plan:
         return Evaluation()
     pushes, duration_s = settings.pushes, skill.geometry.duration_s
     protocol = PushProtocol(pushes.count, pushes.size_m, pushes.at, duration_s, settings.seed)
@@ -308,10 +339,19 @@ def _pushes(
 
 
 def _picture(field: ArrayField, scene: Scene) -> Evaluation:
-    if scene.box.dim != 2:
+    if scene.box.dim != 2 or field.is_plan:
         return Evaluation()
     points = sample_box(scene.box, PICTURE_POINTS_PER_AXIS, seed=0).points
     return Evaluation(arrays={"field_points": points, "field_velocity": field.velocity(points)})
+
+
+def _names(skill: Skill, demonstrations: Demonstrations) -> Evaluation:
+    """What coordinates are called where they are joints, and what follows these."""
+    if not skill.joints:
+        return Evaluation()
+    known = demonstrations.joint_names or [f"joint {number + 1}" for number in range(skill.joints)]
+    joints = [f"{name.removesuffix('_joint')} [rad]" for name in known]
+    return Evaluation(arrays={"state_names": np.array([*joints, *(POSE_NAMES if skill.pose is not None else ())])})
 
 
 def _starts_per_axis(settings: EvaluationConfig) -> int:

@@ -150,8 +150,10 @@ def _interface(policy: Policy) -> dict[str, Any]:
 def _goals(skill: Skill | ConditionalSkill) -> dict[str, Any]:
     """Where motions end; with conditions, what these are and where motions end under those demonstrated."""
     if isinstance(skill, Skill) and skill.pose is not None:
-        position, orientation = skill.pose.to_pose(torch.tensor(skill.geometry.goal, dtype=torch.float64))
-        return {"goal": {ports.POSITION: position.tolist(), ports.ORIENTATION: orientation.tolist()}}
+        joints, pose = torch.tensor(skill.geometry.goal, dtype=torch.float64).tensor_split([skill.joints])
+        position, orientation = skill.pose.to_pose(pose)
+        goal = {ports.POSITION: position.tolist(), ports.ORIENTATION: orientation.tolist()}
+        return {"goal": goal | ({ports.JOINTS: joints.tolist()} if skill.joints else {})}
     if isinstance(skill, Skill):
         return {"goal": list(skill.geometry.goal)}
     return {
@@ -168,7 +170,7 @@ def _goal(skill: Skill | ConditionalSkill, demonstrations: Demonstrations) -> li
     if isinstance(skill, ConditionalSkill):
         goal: list[float] = skill.conditioning.goal_at(np.array(demonstrations[0].condition)).tolist()
         return goal
-    return list(skill.geometry.goal[: 3 if skill.pose is not None else None])
+    return list(skill.geometry.goal[: (skill.joints or 3) if skill.pose is not None else None])
 
 
 def _range(policy: Policy) -> dict[str, Any]:
@@ -212,7 +214,9 @@ def _arrays(policy: Policy, states: Tensor, conditions: Tensor, times_s: Tensor)
     if policy.pose is None:
         measured = {policy.inputs[0].name: states}
     else:
-        position, orientation = policy.pose.to_pose(states.float())
-        measured = {ports.POSITION: position, ports.ORIENTATION: orientation}
+        joints, pose = states.float().tensor_split([policy.joints], dim=-1)
+        position, orientation = policy.pose.to_pose(pose)
+        measured = {ports.JOINTS: joints} if policy.joints else {}
+        measured |= {ports.POSITION: position, ports.ORIENTATION: orientation}
     asked = measured | {ports.CONDITION: conditions, ports.ELAPSED: times_s}
     return {one.name: asked[one.name].float().numpy() for one in policy.inputs if one.default is None}

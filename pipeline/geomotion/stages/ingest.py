@@ -15,12 +15,15 @@ from geomotion.tracking import Artefacts, StageRun
 
 __all__ = ["ingest", "summary_table"]
 
+SKELETON = "skeleton.json"
+
 
 def ingest(config: DatasetConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
     """Read and preprocess the demonstrations that `config` names.
 
     Writes the dataset in the layout of :mod:`geomotion.demos.storage`, ``summary.json`` (what
-    :func:`summary_table` prints) and ``figures/demonstrations``.
+    :func:`summary_table` prints) and ``figures/demonstrations``; where a body was recorded whose model is at hand, also
+    ``skeleton.json``.
 
     Raises:
         MissingData: If the recordings are not there.
@@ -35,5 +38,8 @@ def ingest(config: DatasetConfig, inputs: Mapping[str, Artefacts], run: StageRun
     digest = storage.save(demonstrations, run.folder)
     run.log_dataset(demonstrations.name, digest, demonstrations.source)
     write_json(run.folder / "summary.json", summarise(demonstrations, config))
+    skeleton = readers.read_skeleton(config, demonstrations)
+    if skeleton is not None:
+        write_json(run.folder / SKELETON, {"nodes": skeleton.document()})
     figure = figure_demonstrations(demonstrations, held_out=held_out)
     save_figure(figure, run.folder / "figures", "demonstrations", figure_data(demonstrations))

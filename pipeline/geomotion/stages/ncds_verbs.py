@@ -1,18 +1,22 @@
 """The verbs of `ncds` as chains of stages."""
 
+from dataclasses import replace
 from typing import Any
 
 from geomotion import conditional_models
 from geomotion.config import DatasetConfig, NcdsConfig, NoObstacle
 from geomotion.figures.report.conditions import condition_rows
 from geomotion.figures.studies.fields import FIELD_STUDY_FIGURES
+from geomotion.figures.studies.nearby import nearby
 from geomotion.files import read_json
-from geomotion.models import ModelConfig
+from geomotion.models import ModelConfig, Skill
 from geomotion.stages import compare, shared
+from geomotion.stages.body_motion import draw_body_motion
 from geomotion.stages.evaluate import EvaluateConfig, scores_table
 from geomotion.stages.evaluate_conditions import evaluate
 from geomotion.stages.export import EXAMPLE, ExportConfig, export, policy_summary
-from geomotion.stages.ingest import ingest
+from geomotion.stages.ingest import SKELETON, ingest
+from geomotion.stages.picture_verbs import PICTURE_STEPS, is_pictured, run_pictured
 from geomotion.stages.policy_motion import leads_an_arm
 from geomotion.stages.policy_replay import PolicyReplayConfig, policy_replay_table, replay_policy
 from geomotion.stages.report import ReportConfig, report
@@ -70,7 +74,10 @@ STEPS = {
     "evaluate": Step(Stage("evaluate", evaluate), ("ingest", "train"), _evaluate_config),
     "export": Step(Stage("export", export), ("ingest", "train"), _export_config),
     "replay": Step(Stage("replay", replay_policy), ("ingest", "train"), _replay_config),
+    "body": Step(Stage("body", draw_body_motion), ("ingest", "train"), lambda session: session.config.body),
     "report": Step(Stage("report", report), (*REPORTED, "replay"), _report_config),
+    **PICTURE_STEPS,
+    "report with body": Step(Stage("report", report), (*REPORTED, "body"), _report_config),
     "report without robot": Step(Stage("report", report), REPORTED, _report_config),
 }
 
@@ -118,13 +125,26 @@ def _replay(session: Session) -> VerbResult:
 
 
 def _report(session: Session) -> VerbResult:
-    """With what the arm did, where states are something that an arm can follow."""
+    """With what the arm did, where an arm can follow the states, or with the body that has the joints."""
     skill = conditional_models.load(session.produce("train").path("model.pt"))
-    name = "report" if leads_an_arm(skill) else "report without robot"
-    return shared.report_verb(session, name)
+    if leads_an_arm(skill):
+        return shared.report_verb(session, "report")
+    has_body = isinstance(skill, Skill) and skill.joints and (session.produce("ingest").folder / SKELETON).is_file()
+    return shared.report_verb(session, "report with body" if has_body else "report without robot")
+
+
+def _ingest(session: Session) -> VerbResult:
+    """With the pictures that belong to some sets."""
+    found = shared.ingest_verb(session)
+    if not is_pictured(session):
+        return found
+    taken = session.produce("snapshots")
+    return replace(found, text=f"{found.text}\npictures {taken.folder}", document=found.document | session.document())
 
 
 def _run(session: Session) -> VerbResult:
+    if is_pictured(session):
+        return run_pictured(session)
     rolled, evaluated, reported = _rollout(session), _evaluate(session), _report(session)
     document = evaluated.document | reported.document
     among_obstacles = not isinstance(session.config.obstacle, NoObstacle)
@@ -146,7 +166,7 @@ NCDS = Program(
     name="ncds",
     steps=STEPS,
     verbs={
-        "ingest": shared.ingest_verb,
+        "ingest": _ingest,
         "train": _train,
         "rollout": _rollout,
         "eval": _evaluate,
@@ -157,6 +177,6 @@ NCDS = Program(
         "compare": shared.compare_verb,
         "check": shared.check_verb,
     },
-    execution_keys=shared.EXECUTION_KEYS | {"solver", "rollout", "replay", "policy", "safety"},
-    study_figures=FIELD_STUDY_FIGURES,
+    execution_keys=shared.EXECUTION_KEYS | {"solver", "rollout", "replay", "body", "policy", "safety"},
+    study_figures={**FIELD_STUDY_FIGURES, "nearby": nearby},
 )

@@ -11,7 +11,7 @@ from geomotion.errors import CorruptArtefact
 from geomotion.figures.arrays import EvaluationArrays, read_evaluation
 from geomotion.figures.report.conditions import condition_rows
 from geomotion.figures.report.ncds_caveats import caveats
-from geomotion.figures.report.ncds_pictures import CAPTIONS, FILM, missing
+from geomotion.figures.report.ncds_pictures import BODY_FILM, CAPTIONS, FILM, missing
 from geomotion.figures.report.ncds_scores import FIELD, headlines
 from geomotion.figures.report.ncds_verdict import verdict
 from geomotion.figures.report.page import Column, Data, Listing, Origin, Page, render
@@ -23,8 +23,9 @@ from geomotion.stages.policy_replay import policy_replay_rows
 from geomotion.tracking import Artefacts, StageRun
 
 Document = Mapping[str, Any]
-STAGES = ("ingest", "train", "rollout", "evaluate", "export", "replay")
-PICTURED = ("ingest", "train", "evaluate", "replay")
+STAGES = ("ingest", "train", "rollout", "evaluate", "export", "replay", "body")
+PICTURED = ("ingest", "train", "evaluate", "replay", "body")
+FILMS = {"replay": FILM, "body": BODY_FILM}
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,8 @@ def report(config: ReportConfig, inputs: Mapping[str, Artefacts], run: StageRun)
 
     Args:
         config: Title and command.
-        inputs: Stages ``ingest``, ``train``, ``evaluate``, and ``rollout``, ``export``, ``replay`` if there were any.
+        inputs: Stages ``ingest``, ``train``, ``evaluate``, and those of ``rollout``, ``export``, ``replay``, ``body``
+            that there were.
         run: Where to write.
 
     Raises:
@@ -156,7 +158,8 @@ def _rollouts(inputs: Mapping[str, Artefacts]) -> tuple[Listing, ...]:
     if "rollout" not in inputs:
         return ()
     rollouts: list[Document] = read_json(inputs["rollout"].path("rollouts.json")).get("rollouts", [])
-    names = ("start", "duration [s]", "points", "to the goal at the end [mm]")
+    unit = rollouts[0]["unit"][0] if rollouts else ""
+    names = ("start", "duration [s]", "points", f"to the goal at the end [{unit}]")
     rows = tuple(
         (str(row["start"]), f"{row['duration_s']:.2f}", str(row["points"]), _to_goal(row), str(row["outcome"]))
         for row in rollouts
@@ -175,13 +178,16 @@ def _replayed(inputs: Mapping[str, Artefacts]) -> tuple[Listing, ...]:
 
 
 def _film(inputs: Mapping[str, Artefacts]) -> Picture | None:
-    path = inputs["replay"].folder / "film.gif" if "replay" in inputs else None
-    return film(path, *FILM) if path is not None and path.is_file() else None
+    for stage, caption in FILMS.items():
+        path = inputs[stage].folder / "film.gif" if stage in inputs else None
+        if path is not None and path.is_file():
+            return film(path, *caption)
+    return None
 
 
 def _to_goal(row: Document) -> str:
-    distance_m = row["distance_to_goal_m"]
-    return "infinite" if distance_m is None else f"{1000 * distance_m:.2f}"
+    distance, (_, per_state_unit) = row["distance_to_goal_m"], row["unit"]
+    return "infinite" if distance is None else f"{per_state_unit * distance:.2f}"
 
 
 def _yaml(configuration: Document) -> str:
@@ -191,4 +197,8 @@ def _yaml(configuration: Document) -> str:
 def _omitted(judged: Document, inputs: Mapping[str, Artefacts]) -> dict[str, str]:
     """Scores and stages that are not there, and why."""
     reasons = {f"Score {name}": str(reason) for name, reason in judged.get("omitted", {}).items()}
+    if recorded(inputs["ingest"], "config.json").get("kind") == "MmmDataset" and "body" not in inputs:
+        reasons["Skeleton and film"] = (
+            "no model of the person is beside the recording; dataset.skeleton= names its file"
+        )
     return reasons if "rollout" in inputs else reasons | {"Rollouts": "the rollout stage was not run"}

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from dataclasses import field as default
 from itertools import product
 from typing import Any
@@ -22,10 +22,12 @@ from geomotion.figures.arrays import Flow
 from geomotion.figures.rollouts import PlanarRollouts, figure_rollouts
 from geomotion.figures.style import save_figure
 from geomotion.files import write_json
-from geomotion.models import Skill
+from geomotion.models import JOINT_CHANNEL, Skill
 from geomotion.obstacles.obstacle import surface_points
 from geomotion.safe_skills import SafeSkill
+from geomotion.scores.evaluation import Unit
 from geomotion.scores.grids import bounding_box, sample_box
+from geomotion.stages.evaluate import state_unit
 from geomotion.stages.phases import Followed, Phase, Start, follow_phases, phases
 from geomotion.stages.safe_motion import follow_in_region
 from geomotion.stages.safety import safe
@@ -118,10 +120,14 @@ def rollout_table(document: Mapping[str, Any]) -> str:
     has_obstacles = document["rollouts"][0]["clearance_m"] is not None
     rows = [("start", "duration", "to goal", *["clearance"] * has_obstacles, "outcome")]
     for row in document["rollouts"]:
-        lengths = [row["distance_to_goal_m"], *[row["clearance_m"]] * has_obstacles]
-        shown = ["infinite" if metres is None else f"{1000 * metres:.2f} mm" for metres in lengths]
-        rows.append((row["start"], f"{row['duration_s']:.2f} s", *shown, row["outcome"]))
+        clearance = [_with_unit(row["clearance_m"], Unit("mm", 1000.0))] * has_obstacles
+        to_goal = _with_unit(row["distance_to_goal_m"], Unit(*row["unit"]))
+        rows.append((row["start"], f"{row['duration_s']:.2f} s", to_goal, *clearance, row["outcome"]))
     return aligned(rows)
+
+
+def _with_unit(distance: float | None, unit: Unit) -> str:
+    return "infinite" if distance is None else f"{unit.per_state_unit * distance:.2f} {unit.name}"
 
 
 def _channels(skill: Skill | ConditionalSkill) -> tuple[str, ...]:
@@ -182,12 +188,16 @@ def _robot_channels(
     if plain.pose is None:
         channel = plain.state_channels[0]
         return {channel: states.numpy(), VELOCITY_OF[channel]: velocities.numpy()}
-    position, orientation = plain.pose.to_pose(states)
-    return {
+    (joints, pose), (turning, moving) = (one.tensor_split([plain.joints], dim=-1) for one in (states, velocities))
+    position, orientation = plain.pose.to_pose(pose)
+    found = {
         "position_m": position.numpy(),
         "orientation_wxyz": orientation.numpy(),
-        VELOCITY_OF["position_m"]: velocities[:, :3].numpy(),
+        VELOCITY_OF["position_m"]: moving[:, :3].numpy(),
     }
+    if plain.joints:
+        found |= {JOINT_CHANNEL: joints.numpy(), VELOCITY_OF[JOINT_CHANNEL]: turning.numpy()}
+    return found
 
 
 def _picture(
@@ -235,6 +245,7 @@ def _row(start: Start, all_phases: list[Phase], outcome: Followed) -> dict[str, 
         "goal_m": list(skill.geometry.goal),
         "status": outcome.status.name,
         "outcome": outcome.status.value,
+        "unit": [*astuple(state_unit(skill.state_channels))],  # of printed distances; how many make one of the state's
         "distance_to_goal_m": distance if math.isfinite(distance) else None,
         "reached_goal": outcome.status is RolloutStatus.reached,
         "clearance_m": outcome.clearance_m,

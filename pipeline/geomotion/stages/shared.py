@@ -39,7 +39,12 @@ def compare_verb(session: Session) -> VerbResult:
 
 def check_verb(session: Session) -> VerbResult:
     """Compare the scores of a pinned experiment with its baseline."""
-    scores = read_json(session.produce("evaluate").path("scores.json"))
-    verdict = regression.check(session.config.check, scores)
+    evaluated = session.produce("evaluate")
+    certificate = evaluated.folder / "certificate.json"  # of fields alone
+    verdict = regression.check(
+        session.config.check,
+        read_json(evaluated.path("scores.json")),
+        read_json(certificate) if certificate.exists() else None,
+    )
     session.tracker.log_document(session.command, "scores.json", verdict.document)
     return VerbResult(verdict.text, session.document(**verdict.document), exit_code=0 if verdict.passed else 1)

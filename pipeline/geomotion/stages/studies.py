@@ -20,16 +20,19 @@ def run_study(session: Session, verb: str) -> VerbResult:
     """Run every cell, then gather them; exit status 1 if one failed.
 
     Raises:
-        InvalidSetting: If the study is not valid, or the verb is another one than ``run``.
+        InvalidSetting: If the study is not valid, or the verb is another one than ``run`` or ``compare``.
         UnknownName: If a figure is asked for that this program does not draw.
     """
     study, program = session.config.study, session.program
-    if verb != "run" or session.config.run is not None:
-        raise InvalidSetting("study.title", study.title, f"no study here: they begin anew, with `{program.name} run`")
+    if verb not in ("run", "compare") or session.config.run is not None or session.config.runs:
+        expected = f"no study here: they begin anew, with `{program.name} compare` or `run`"
+        raise InvalidSetting("study.title", study.title, expected)
     for figure in study.figures:
         if figure not in program.study_figures:
             raise UnknownName("study figure", figure, program.study_figures)
     cells = compose_cells(program.name, study, session.overrides)
+    if study.shard is not None:
+        cells = cells[study.shard :: study.shards]
     outcomes: dict[str, Outcome] = {}
     for outcome in run_cells(cells, session.command, study.jobs):
         outcomes[outcome.cell.name] = outcome
@@ -37,7 +40,9 @@ def run_study(session: Session, verb: str) -> VerbResult:
         logger.info("study: %d of %d, %s: %s", len(outcomes), len(cells), outcome.cell.name, state)
 
     ordered = [outcomes[composed.cell.name] for composed in cells]
-    config = StudyStageConfig(replace(study, jobs=1), [_record(one) for one in ordered], session.reproduction)
+    config = StudyStageConfig(
+        replace(study, jobs=1, shards=1, shard=None), [_record(one) for one in ordered], session.reproduction
+    )
     inputs = {f"evaluate_{n}": one.done["evaluate"] for n, one in enumerate(ordered) if one.failure is None}
     stage = Stage("study", partial(summarise_study, draw=program.study_figures))
     found = session.tracker.run_stage(stage, config, inputs, session.command)

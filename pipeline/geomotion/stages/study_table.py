@@ -4,11 +4,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import fmean, pstdev
 from typing import Any
 
+import numpy as np
+
 from geomotion.config import ReferenceConfig, StudyConfig
 from geomotion.tables import aligned, markdown, number
 
 Document = Mapping[str, Any]
 Key = tuple[str, str]  # dataset and variant
+CONFIDENCE = 0.95
+RESAMPLED = 2000  # means behind an interval
 
 
 def table_document(study: StudyConfig, scores: Mapping[Key, Sequence[Document]], failures: list[str]) -> dict[str, Any]:
@@ -78,7 +82,10 @@ def legend(document: Document) -> list[str]:
         unit = f" [{one['unit']}]" if one["unit"] not in (None, "1") else ""
         found.append(f"{one['title']}: {one['score']}{unit}")
     if len(document["seeds"]) > 1:
-        found.append(f"mean ± standard deviation over {len(document['seeds'])} seeds")
+        found.append(
+            f"mean ± standard deviation over {len(document['seeds'])} seeds [{CONFIDENCE:.0%} bootstrap interval of "
+            "the mean, over seeds and what each one judged]"
+        )
     return found
 
 
@@ -95,12 +102,36 @@ def _over_seeds(scores: Sequence[Document | None]) -> dict[str, Any] | None:
         return None
     values = [score["value"] for score in known]
     if any(value is None for value in values):
-        return {"mean": None, "spread": None, "values": values}
-    return {"mean": fmean(values), "spread": pstdev(values), "values": values}
+        return {"mean": None, "spread": None, "interval": None, "values": values}
+    return {"mean": fmean(values), "spread": pstdev(values), "interval": bootstrap_interval(known), "values": values}
+
+
+def bootstrap_interval(scores: Sequence[Document]) -> list[float] | None:
+    """Percentile interval of a mean over seeds, each of which is a mean over what it judged.
+
+    Seeds are drawn with replacement, then the values of each drawn seed; None where there is one seed.
+    """
+    if len(scores) < 2:
+        return None
+    own = [
+        score["values"] if score["statistic"] == "mean" and score["values"] else [score["value"]] for score in scores
+    ]
+    if any(value is None for values in own for value in values):
+        return None
+    generator = np.random.default_rng(0)
+    means = np.stack([generator.choice(values, (RESAMPLED, len(scores), len(values))).mean(-1) for values in own])
+    drawn = generator.integers(len(own), size=(RESAMPLED, len(scores)))
+    resampled = means[drawn, np.arange(RESAMPLED)[:, None], np.arange(len(scores))].mean(axis=1)
+    tail = (1 - CONFIDENCE) / 2
+    return [float(end) for end in np.quantile(resampled, (tail, 1 - tail))]
 
 
 def _cell(value: Document | None) -> str:
-    return "–" if value is None else number(value["mean"], value["spread"])
+    if value is None:
+        return "–"
+    low, high = value["interval"] or (0, 0)
+    interval = f" [{low:.3g}, {high:.3g}]" if low < high else ""
+    return number(value["mean"], value["spread"]) + interval
 
 
 def _unit(name: str, scores: Mapping[Key, Sequence[Document]]) -> str | None:

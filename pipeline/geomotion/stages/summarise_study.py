@@ -4,8 +4,10 @@ import csv
 import io
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from geomotion.config import StudyConfig
 from geomotion.figures.report.page import Column, Listing
@@ -13,7 +15,8 @@ from geomotion.figures.report.pictures import Picture, pictures
 from geomotion.figures.report.study_page import StudyPage, render_study
 from geomotion.figures.studies.panels import DrawStudy, JudgedCell, StudyFigure
 from geomotion.figures.style import save_figure
-from geomotion.files import read_json, write_json, write_text
+from geomotion.files import atomic, read_json, write_json, write_text
+from geomotion.stages.initial_conditions import initial_conditions
 from geomotion.stages.study_cells import Cell
 from geomotion.stages.study_table import legend, lines, markdown_table, reference_values, table_document
 from geomotion.tracking import Artefacts, StageRun
@@ -55,7 +58,7 @@ class StudyStageConfig:
 def summarise_study(
     config: StudyStageConfig, inputs: Mapping[str, Artefacts], run: StageRun, draw: Mapping[str, DrawStudy]
 ) -> None:
-    """Write ``table.json``, ``table.csv``, ``table.md``, the figures and ``report.html``.
+    """Write ``table.json``, ``table.csv``, ``table.md``, ``initial_conditions.npz``, the figures and ``report.html``.
 
     Args:
         config: The study and its cells.
@@ -73,8 +76,11 @@ def summarise_study(
     by_row: dict[tuple[str, str], list[Document]] = {}
     for cell, own in scores:
         by_row.setdefault((cell.dataset, cell.variant), []).append(own)
+    starts, differing = initial_conditions([(cell, found.folder) for cell, found in judged])
     failures = [f"{one.cell.name}: {one.failure}" for one in config.cells if one.failure is not None]
-    table = table_document(study, by_row, failures)
+    table = table_document(replace(study, notes=[*study.notes, *differing]), by_row, failures)
+    with atomic(run.folder / "initial_conditions.npz") as temporary:
+        np.savez_compressed(temporary, allow_pickle=False, **starts)
     write_json(run.folder / "table.json", table)
     write_text(run.folder / "table.csv", _csv(study, scores))
     write_text(run.folder / "table.md", markdown_table(table))
@@ -115,7 +121,7 @@ def _page(config: StudyStageConfig, table: Document, shown: Sequence[Picture]) -
         title=config.study.title,
         table=Listing("Table", columns, tuple(map(tuple, rows))),
         legend=legend(table),
-        notes=list(config.study.notes),
+        notes=list(table["notes"]),
         failures=list(table["failures"]),
         pictures=list(shown),
         runs=Listing("Runs", names, runs),

@@ -24,16 +24,20 @@ from geomotion.errors import DatasetError, InvalidSetting
 from geomotion.figures.training import save_training_figure
 from geomotion.files import atomic, write_json
 from geomotion.lie.poses import Group, PoseCoordinates
-from geomotion.models import ModelConfig, Skill
+from geomotion.models import JOINT_CHANNEL, ModelConfig, Skill
 from geomotion.stages.train_decoder import train_decoder
 from geomotion.tracking import Artefacts, StageRun
 from geomotion.training.adjoint import TrajectoryShooting
 from geomotion.training.conditioning import Conditioning, with_conditions
 from geomotion.training.data import Geometry, TrainingSet
 from geomotion.training.injective_vae import encoded
+from geomotion.training.likelihood import TransitionLikelihood
 from geomotion.training.objectives import VelocityReconstruction
-from geomotion.training.trainer import Objective, Schedule, fit
+from geomotion.training.start import mean_square_distance, start_from_data
+from geomotion.training.trainer import History, Objective, Schedule, fit
 from geomotion.training.trajectories import TrajectoryReproduction
+
+LEVER_BESIDE_JOINTS_M = 1.0  # so that a turn counts as much as the same turn of a joint
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
     train_demos, test_demos = split(config.selection, demonstrations)
     coordinates = _pose_coordinates(config, demonstrations.select(train_demos))
     demonstrations = with_pose_vectors(demonstrations, coordinates)
-    channels = (POSE_CHANNEL,) if coordinates else state_channels(config.selection, demonstrations)
+    channels = _channels(config, demonstrations)
     selected = demonstrations.select(train_demos)
     shown = data = TrainingSet.from_demonstrations(selected, channels)
     geometry = Geometry.of(data)
@@ -88,8 +92,12 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
         seen = encoded(data, decoder)
         place = Geometry.of(seen)
     field = models.build(models.of_codes(config.model), place)
-    objective = _objective(config, seen, place)
-    history = fit(field, objective, _schedule(config), run.checkpoint, run.log_series)
+    started = start_from_data(field, seen)
+    if isinstance(config.training, schema.ClosedFormTraining):
+        history = _closed_form(config, started, field, seen, place)
+    else:
+        objective = _objective(config, seen, place)
+        history = fit(field, objective, _schedule(config), run.checkpoint, run.log_series)
     if decoder is not None:
         field = decoded(decoder, field)
 
@@ -112,10 +120,23 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
 def _pose_coordinates(config: TrainConfig, demonstrations: Demonstrations) -> PoseCoordinates | None:
     if config.space is None:
         return None
-    if config.selection.state_channels is not None:
-        raise InvalidSetting("dataset.state_channels", config.selection.state_channels, "null beside `space`")
-    group: Group = "SO3" if config.space is schema.PoseSpace.R3xSO3 else "S3"
-    return fit_pose_coordinates(demonstrations, group, config.pose.cover.value, config.pose.lever_m_per_rad)
+    channels, beside = config.selection.state_channels, config.space is schema.PoseSpace.RnxR3xSO3
+    if channels is not None and not (beside and channels == [JOINT_CHANNEL]):
+        raise InvalidSetting("dataset.state_channels", channels, "null beside `space`")
+    group: Group = "S3" if config.space is schema.PoseSpace.R3xS3 else "SO3"
+    lever_m = config.pose.lever_m_per_rad or (LEVER_BESIDE_JOINTS_M if beside else None)
+    return fit_pose_coordinates(demonstrations, group, config.pose.cover.value, lever_m)
+
+
+def _channels(config: TrainConfig, demonstrations: Demonstrations) -> tuple[str, ...]:
+    """Channels of the demonstrations, and of the poses in them, that make up the state."""
+    if config.space is None:
+        return state_channels(config.selection, demonstrations)
+    if config.space is not schema.PoseSpace.RnxR3xSO3:
+        return (POSE_CHANNEL,)
+    if JOINT_CHANNEL not in demonstrations.channel_names:
+        raise DatasetError(demonstrations.name, f"has no {JOINT_CHANNEL}; space={config.space.value} needs them")
+    return JOINT_CHANNEL, POSE_CHANNEL
 
 
 def _conditions(demonstrations: Demonstrations) -> np.ndarray:
@@ -143,6 +164,16 @@ def _certify_conditions(skill: ConditionalSkill, demonstrations: Demonstrations,
     return for_all_conditions(certificates)
 
 
+def _closed_form(
+    config: TrainConfig, started: bool, field: ChartedField, data: TrainingSet, geometry: Geometry
+) -> History:
+    """The only row of the history of a field that is computed from the demonstrations."""
+    if not (started and field.is_solvable):
+        raise InvalidSetting("training", "closed_form", "velocity or the like: this field has to be trained")
+    distance = mean_square_distance(field.eval(), data, geometry)
+    return History([{"step": 0.0, "total": distance, "learning_rate": 0.0}])
+
+
 def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Objective[ChartedField]:
     match config.training:
         case schema.VelocityTraining() as velocity:
@@ -157,6 +188,10 @@ def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Ob
             return TrajectoryReproduction(data, geometry, trajectory)
         case schema.AdjointTraining() as adjoint:
             return TrajectoryShooting(data, geometry, adjoint)
+        case schema.LikelihoodTraining() as likelihood:
+            if not isinstance(config.model.field, schema.ImitationFlowField):
+                raise InvalidSetting("training", "likelihood", "velocity: this field is not stochastic")
+            return TransitionLikelihood(data, geometry, likelihood)
         case unknown:
             raise TypeError(f"no objective for {type(unknown).__name__}")
 

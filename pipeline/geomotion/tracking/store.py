@@ -113,6 +113,24 @@ def open_store(config: TrackingConfig) -> tuple["MlflowClient", str]:
             raise StoreUnavailable(uri, f"another program has held {root / '.store.lock'} for two minutes") from error
 
 
+def open_existing(config: TrackingConfig) -> tuple["MlflowClient", str]:
+    """The client and the experiment's id of a store that this process does not write to.
+
+    Raises:
+        StoreUnavailable: If the store cannot be read, or has no such experiment.
+    """
+    _quiet()
+    uri = store_uri(config)
+    import mlflow
+
+    with store_errors(uri):
+        client = cast("MlflowClient", _WholeCalls(mlflow.MlflowClient(tracking_uri=uri)))
+        found = client.get_experiment_by_name(config.experiment)
+    if found is None:
+        raise StoreUnavailable(uri, f"it has no experiment {config.experiment!r}")
+    return client, found.experiment_id
+
+
 class _WholeCalls:
     """A client whose calls end before a signal counts: SQLAlchemy logs a traceback for one that it unwinds."""
 

@@ -19,6 +19,7 @@ from geomotion.errors import GeomotionError, Interrupted, MissingRun
 from geomotion.files import temporary_prefix, write_json
 from geomotion.tracking import store
 from geomotion.tracking.artefacts import Artefacts, digest_of, environment, run_key
+from geomotion.tracking.merging import OtherResults
 from geomotion.tracking.stage import Stage, StageRun
 
 logger = logging.getLogger("geomotion")
@@ -30,9 +31,11 @@ if TYPE_CHECKING:
 COMMAND, STAGE, KEY, DIGEST, ERROR = (f"geomotion.{name}" for name in ("command", "stage", "key", "digest", "error"))
 OVERRIDES = "geomotion.overrides"
 SAME = "geomotion.same_as"  # an older run whose artefacts stand for those of this one
+MERGED = "geomotion.taken_over_from"  # run id in another results folder
 INPUT = "geomotion.input."
 MEMBER = "geomotion.stage."
 PARENT = "mlflow.parentRunId"
+POINTS_AT_ONCE = 500  # MLflow takes at most 1000
 RESUMABLE = ("KILLED", "FAILED", "RUNNING")  # RUNNING: its process died without a word, or its lock would be held
 
 
@@ -60,6 +63,7 @@ class Tracker:
         self.program = program
         self.uri = store.store_uri(config)
         self.reuse = reuse
+        self.others = [OtherResults(root, config.experiment) for root in config.merge]
         self.work = Path(config.root).resolve() / "work"
         self.client: MlflowClient
         self.client, self.experiment_id = store.open_store(config)
@@ -95,6 +99,8 @@ class Tracker:
         key = run_key(stage.name, config, inputs)
         with self._computing(stage.name, key):
             found = self._finished(key) if self.reuse and not stage.reads_outside else None
+            if found is None and not stage.reads_outside:
+                found = self._taken_over(stage, config, inputs, parent, key)
             if found is None:
                 begun = time.monotonic()
                 found = self._execute(stage, config, inputs, parent, key)
@@ -137,9 +143,7 @@ class Tracker:
             self._discard(checkpoint)
         run_id = self._stopped(key) if any(self._kept(checkpoint)) else None
         if run_id is None:
-            tags = {STAGE: stage.name, KEY: key, PARENT: parent.run_id, "mlflow.source.name": parent.name}
-            run_id = self._create(stage.name, tags | {INPUT + name: found.run_id for name, found in inputs.items()})
-            self._log_parameters(run_id, config)
+            run_id = self._begin(stage, config, inputs, parent, key)
         with self._ending(run_id), self._scratch(key) as folder:
             run = StageRun(folder, checkpoint, self.client, run_id)
             write_json(run.folder / "config.json", plain(config))
@@ -155,6 +159,31 @@ class Tracker:
                 self.client.log_artifacts(run_id, str(folder))
                 self.client.set_tag(run_id, DIGEST, digest)
         self._discard(checkpoint)
+        return self._artefacts(self.client.get_run(run_id))
+
+    def _begin(
+        self, stage: Stage, config: object, inputs: Mapping[str, Artefacts], parent: CommandRun, key: str
+    ) -> str:
+        tags = {STAGE: stage.name, KEY: key, PARENT: parent.run_id, "mlflow.source.name": parent.name}
+        run_id = self._create(stage.name, tags | {INPUT + name: found.run_id for name, found in inputs.items()})
+        self._log_parameters(run_id, config)
+        return run_id
+
+    def _taken_over(
+        self, stage: Stage, config: object, inputs: Mapping[str, Artefacts], parent: CommandRun, key: str
+    ) -> Artefacts | None:
+        """A copy of the same computation from another results folder, with all that it logged."""
+        other = next((found for one in self.others if (found := one.finished(key, KEY, DIGEST)) is not None), None)
+        if other is None:
+            return None
+        run_id = self._begin(stage, config, inputs, parent, key)
+        with self._ending(run_id), store.store_errors(self.uri):
+            for first in range(0, len(other.curves), POINTS_AT_ONCE):
+                self.client.log_batch(run_id, metrics=other.curves[first : first + POINTS_AT_ONCE])
+            self.client.log_artifacts(run_id, str(other.folder))
+            self.client.set_tag(run_id, MERGED, other.run.info.run_id)
+            self.client.set_tag(run_id, DIGEST, other.run.data.tags[DIGEST])
+        logger.info("%s: taken over from run %s", stage.name, other.run.info.run_id[:8])
         return self._artefacts(self.client.get_run(run_id))
 
     def _kept(self, checkpoint: Path) -> list[Path]:

@@ -3,10 +3,12 @@
 from geomotion.config import (
     DatasetConfig,
     FolderDataset,
+    GraspAndDropDataset,
     JCDataset,
     LasaDataset,
     LasaPoseDataset,
     LettersDataset,
+    MmmDataset,
     PandaCircleJointDataset,
     PandaPouringDataset,
     PandaPouringJointDataset,
@@ -18,10 +20,30 @@ from geomotion.config import (
     StraightLinesDataset,
 )
 from geomotion.demos.demonstrations import Demonstrations
-from geomotion.demos.generators import jc, letters, panda_joint, panda_pouring, panda_reach, planar, straight_lines
-from geomotion.demos.readers import folder, lasa, lasa_pose, robotasks9, robotasks9_joint
+from geomotion.demos.generators import (
+    jc,
+    letters,
+    panda_grasp_and_drop,
+    panda_joint,
+    panda_pouring,
+    panda_reach,
+    planar,
+    straight_lines,
+)
+from geomotion.demos.readers import folder, lasa, lasa_pose, mmm, robotasks9, robotasks9_joint
+from geomotion.robot.skeleton import Skeleton
 
-__all__ = ["read"]
+__all__ = ["read", "read_skeleton"]
+
+
+def read_skeleton(config: DatasetConfig, demonstrations: Demonstrations) -> Skeleton | None:
+    """The body whose joints were recorded, in metres; None where there is none, or none is known.
+
+    Raises:
+        MissingData: If its file does not exist.
+        DatasetError: If it cannot be read, or is not that of these demonstrations.
+    """
+    return mmm.read_skeleton(config, demonstrations) if isinstance(config, MmmDataset) else None
 
 
 def read(config: DatasetConfig) -> Demonstrations:
@@ -40,6 +62,8 @@ def read(config: DatasetConfig) -> Demonstrations:
             return robotasks9_joint.read(config)
         case RoboTasks9Dataset():
             return robotasks9.read(config)
+        case MmmDataset():
+            return mmm.read(config)
         case FolderDataset():
             return folder.read(config)
         case LettersDataset():
@@ -52,6 +76,8 @@ def read(config: DatasetConfig) -> Demonstrations:
             return panda_reach.generate(config)
         case PandaPouringDataset():
             return panda_pouring.generate(config)
+        case GraspAndDropDataset():
+            return panda_grasp_and_drop.generate(config)
         case PandaReachJointDataset():
             return panda_joint.reach_to_grasp(config)
         case PandaPouringJointDataset():

@@ -10,6 +10,11 @@ FILM = (
     "The policy is asked anew in every control period. Blue: where it would go undisturbed. Red dots end where a force "
     "pushes the arm, which yields to it; nothing but the policy brings it back.",
 )
+BODY_FILM = (
+    "The body in motion",
+    "Orange: led by the learned field, never corrected. Grey: the demonstration at the same time. From elsewhere, the "
+    "joints come back to the path of the demonstration, but may stay ahead of it or behind.",
+)
 CAPTIONS: Captions = {
     "demonstrations": (
         "Demonstrations",
@@ -19,6 +24,17 @@ CAPTIONS: Captions = {
         "Learned motion",
         "Orange should lie on black: each rollout starts where its demonstration starts and is never corrected. Dotted "
         "and dashed curves were kept from training. Green and grey, where present, show what happens elsewhere.",
+    ),
+    "body": (
+        "The body over time",
+        "Orange should lie on grey, the demonstration at the same time; below, soon after a start that is off in every "
+        "joint. Snapshots stand apart from each other. Where the skill is of joints alone, the hip does not move.",
+    ),
+    "latent_paths": (
+        "The skill in its latent space",
+        "Dots are the demonstration, encoded; the star is the goal. Motions from elsewhere come to the line where "
+        "nothing is left beside the skill, and to the goal along it; where they start along it decides how far ahead "
+        "or behind they are.",
     ),
     "eigenvalues": (
         "Where the field contracts",

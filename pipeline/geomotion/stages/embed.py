@@ -1,0 +1,107 @@
+"""Fit what turns the features of a picture into the condition of a skill, and judge it on pictures it has not seen."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+
+from geomotion import conditional_models
+from geomotion.conditional_models import ConditionalPolicy, ConditionalSkill
+from geomotion.config import EncoderConfig, ManipulationSkill
+from geomotion.demos import storage
+from geomotion.demos.generators.panda_grasp_and_drop import PLACES_M
+from geomotion.demos.snapshots import BETWEEN, Snapshots
+from geomotion.errors import CorruptArtefact, InvalidSetting
+from geomotion.files import read_json, write_json
+from geomotion.pictured_skills import save_embedding
+from geomotion.tracking import Artefacts, StageRun
+from geomotion.training.data import TrainingSet
+from geomotion.training.embedding import Embedding, Seen, Shown, barycentric, fit_embedding
+
+TEST_EVERY = 5  # of the pictures, one is not trained on
+
+
+@dataclass(frozen=True)
+class EmbedConfig:
+    """What the embed stage needs."""
+
+    encoder: EncoderConfig
+    skill: ManipulationSkill
+
+
+def embed(config: EmbedConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
+    """Write ``embedding.pt`` and ``embedding.json``.
+
+    Raises:
+        CorruptArtefact: If the model has no conditions.
+        InvalidSetting: If the trajectories of its field are not known in closed form, which their loss needs.
+    """
+    skill = conditional_models.load(inputs["train"].path("model.pt"))
+    if not isinstance(skill, ConditionalSkill):
+        raise CorruptArtefact(inputs["train"].path("model.pt"), "this model has no conditions")
+    if config.encoder.trajectory_weight > 0 and not skill.augmented.field.is_solvable:
+        weight = config.encoder.trajectory_weight
+        raise InvalidSetting("encoder.trajectory_weight", weight, "0, but for field=linear trained on trajectories")
+    name = f"{config.skill.value}.npz"
+    pictures = Snapshots.load(inputs["snapshots"].path(name))
+    with np.load(inputs["encode"].path(name), allow_pickle=False) as found:
+        features = torch.from_numpy(found["features"])
+    is_test = _held_out(pictures)
+    seen = Seen(features, torch.from_numpy(pictures.place), torch.from_numpy(barycentric(pictures.object_m, PLACES_M)))
+    trained = _rows(seen, ~is_test)
+    embedding, losses = fit_embedding(trained, _shown(skill, inputs), config.encoder)
+    save_embedding(run.folder / "embedding.pt", embedding)
+    document = {
+        "skill": config.skill.value,
+        "encoder": read_json(inputs["encode"].path("encoder.json")),
+        "losses": losses,
+        "training_pictures": int((~is_test).sum()),
+        "held_out": _judged(embedding, _rows(seen, is_test), pictures.object_m[is_test]),
+    }
+    write_json(run.folder / "embedding.json", document)
+    run.log_series(0, {f"embedding.loss.{key}": value for key, value in losses.items()})
+
+
+def _held_out(pictures: Snapshots) -> np.ndarray:
+    """The last of each kind."""
+    is_test = np.zeros(len(pictures), dtype=bool)
+    for place in np.unique(pictures.place):
+        rows = np.flatnonzero(pictures.place == place)
+        is_test[rows[len(rows) - len(rows) // TEST_EVERY :]] = True
+    return is_test
+
+
+def _rows(seen: Seen, chosen: np.ndarray) -> Seen:
+    rows = torch.from_numpy(chosen)
+    return Seen(seen.features[rows], seen.place[rows], seen.coordinates[rows])
+
+
+def _shown(skill: ConditionalSkill, inputs: Mapping[str, Artefacts]) -> Shown:
+    demonstrations = storage.load(inputs["ingest"].folder).select(skill.augmented.train_demos)
+    place = np.array([int(np.argmax(one.condition)) for one in demonstrations.trajectories])
+    data = TrainingSet.from_demonstrations(demonstrations, skill.augmented.state_channels)
+    return Shown(ConditionalPolicy(skill).eval().requires_grad_(False), data, place, skill.augmented.geometry.scale_m)
+
+
+@torch.no_grad()
+def _judged(embedding: Embedding, seen: Seen, object_m: np.ndarray) -> dict[str, Any]:
+    """Confusion of places, and how far from the object the condition says that it is."""
+    classes = embedding.scores(seen.features).argmax(-1).numpy()
+    place, count = seen.place.numpy(), embedding.places
+    truth = np.where(place == BETWEEN, count, place)
+    kinds = count + int(embedding.knows_elsewhere)
+    confusion = np.zeros((kinds, kinds), dtype=int)
+    known = truth < kinds
+    np.add.at(confusion, (truth[known], classes[known]), 1)
+    apart_m = np.linalg.norm(embedding(seen.features).double().numpy() @ PLACES_M - object_m, axis=1)
+    found: dict[str, Any] = {"confusion": confusion.tolist()}
+    for name, rows in (("places", place != BETWEEN), ("between", place == BETWEEN)):
+        if rows.any():
+            median, high = np.quantile(apart_m[rows], [0.5, 0.95])
+            found[name] = {"pictures": int(rows.sum()), "median_m": float(median), "95_percent_m": float(high)}
+    at_places = place != BETWEEN
+    scores = embedding.scores(seen.features)[:, :count].argmax(-1).numpy()
+    found["place_accuracy"] = float((scores == place)[at_places].mean())
+    return found
