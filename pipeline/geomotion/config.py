@@ -2097,6 +2097,7 @@ def register() -> None:
             "velocity": VelocityTraining,
             # behind a flow, longer training fits how fast each demonstration was, and bends the paths between them
             "velocity_behind_flow": VelocityTraining(steps=1500, learning_rate=2e-3, batch_points=256),
+            "elcd": VelocityTraining(steps=2000, learning_rate=5e-3, batch_points=256),
             # few parameters, of different kinds
             "seds": VelocityTraining(steps=1500, learning_rate=2e-2, batch_points=512),
             "adjoint": AdjointTraining,
