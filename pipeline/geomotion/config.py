@@ -2096,7 +2096,7 @@ def register() -> None:
             "scattered": TrajectoryTraining(steps=300, mixing=1.0, start_noise=0.1, weight_penalty=1e-2),
             "velocity": VelocityTraining,
             # behind a flow, longer training fits how fast each demonstration was, and bends the paths between them
-            "velocity_behind_flow": VelocityTraining(steps=1500, learning_rate=2e-3, batch_points=256),
+            "euclideanizing_flow": VelocityTraining(steps=1500, learning_rate=2e-3, batch_points=256),
             "elcd": VelocityTraining(steps=2000, learning_rate=5e-3, batch_points=256),
             # few parameters, of different kinds
             "seds": VelocityTraining(steps=1500, learning_rate=2e-2, batch_points=512),

@@ -126,6 +126,6 @@ def _run(
 def _line(judged: dict[str, Any], certificate: dict[str, Any]) -> str:
     held_out, rate = judged["held_out"], certificate["rate_per_s"]
     proven = f" at {rate:.3g} 1/s" if rate is not None else ""
-    claim = f"contraction under every picture {certificate['claim'].replace('_', ' ')}{proven}"
+    claim = f"contraction {certificate['claim'].replace('_', ' ')}, at the shown places{proven}"
     places = f"place right in {held_out['place_accuracy']:.1%} of {held_out['places']['pictures']} unseen pictures"
     return f"{places}; {claim}"

@@ -43,7 +43,8 @@ def verdict(certificates: Mapping[str, Mapping[str, Any]], acted: Mapping[str, A
     proven = all(rate is not None for rate in rates.values())
     listed = " and ".join(f"{rate:.2g} 1/s for the {skill}" for skill, rate in rates.items() if rate is not None)
     claim = (
-        f"Under every picture, motions come together from any two starts, in a learned metric: at {listed}."
+        "Under every picture, motions come together from any two starts, in a learned metric; "
+        f"at the shown places at {listed}."
         if proven
         else "Nothing guarantees that motions from different starts come together."
     )
