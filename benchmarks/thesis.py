@@ -3,9 +3,9 @@
 Run as ``python benchmarks/thesis.py [--small] [--only NAME …] [--results FILE]``, or ``make thesis``, or ``make
 thesis-small``. Each experiment is the command above its table, its output read by a program: finished stages are
 reused, so that what was stopped goes on where it was. Its table replaces what stands between ``<!-- thesis/NAME -->``
-and ``<!-- end -->`` in the file; the text around is written by people. Recordings that are not fetched by themselves
-are named by ``--robotasks9`` and ``--mmm``; experiments without their recordings are left out, and listed. Exits with 1
-if one failed.
+and ``<!-- end -->`` in the file; the text around is written by people. Human motion is not fetched by itself and has to
+be named by ``--mmm``, or its experiments are left out, and listed; RoboTasks9 is, where ``--robotasks9`` names no copy.
+Exits with 1 if one failed. Fig. 6.16, of two policies, has no table here.
 """
 
 import argparse
@@ -27,7 +27,8 @@ from geomotion.files import write_text
 from geomotion.stages.study_table import markdown_table
 from geomotion.tables import markdown, number
 
-ROBOTASKS9, MMM = "robotasks9", "mmm"  # recordings that have to be named
+ROBOTASKS9, MMM = "robotasks9", "mmm"  # recordings that can be named, the second has to be
+LEFT_OUT = f"left out: name its recordings with --{MMM}"
 NO_MOTION = 3  # exit status of a plan or replay that found no way, which some figures are about
 SMALL_FIELD = ("training.steps=20", "evaluation.contraction_grid_points=5", "evaluation.region_starts=4")
 SMALL_STUDY = (*SMALL_FIELD, "study.seeds=[0]")
@@ -46,7 +47,7 @@ class Experiment:
         scores: Patterns of the scores to show; a study has columns of its own.
         small: Settings of the toy size.
         program: Which one runs it.
-        recordings: What has to be named, if anything.
+        recordings: What is named on the command line, if anything.
     """
 
     name: str
@@ -116,19 +117,21 @@ def main() -> int:
     parser.add_argument("--results", type=Path, help="file whose tables are replaced; without it they are printed")
     parser.add_argument("--jobs", type=int, default=1, help="experiments at once")
     parser.add_argument("--root", default="runs", help="results folder")
-    parser.add_argument(f"--{ROBOTASKS9}", help="folder of these recordings")
+    parser.add_argument(f"--{ROBOTASKS9}", help="folder of these recordings, instead of fetching them")
     parser.add_argument(f"--{MMM}", help="file of a human motion in MMM XML")
     parser.add_argument("overrides", nargs="*", help="further settings for every experiment")
     asked = parser.parse_args()
     if unknown := set(asked.only or ()) - {one.name for one in EXPERIMENTS}:
         parser.error(f"no experiment {', '.join(sorted(unknown))}; there are {', '.join(e.name for e in EXPERIMENTS)}")
+    if asked.results is not None and not asked.results.is_file():
+        parser.error(f"no file {asked.results} whose tables could be replaced")
     failed = []
     wanted = [one for one in EXPERIMENTS if not asked.only or one.name in asked.only]
     pool = ThreadPoolExecutor(asked.jobs)
     for experiment, outcome in zip(wanted, pool.map(partial(run, asked=asked), wanted), strict=True):
         if outcome.table is None:
             print(f"{experiment.name}: {outcome.failure}", file=sys.stderr, flush=True)
-            failed += [] if outcome.failure == _left_out(experiment) else [experiment.name]
+            failed += [] if outcome.failure == LEFT_OUT else [experiment.name]
         elif asked.results is None:
             print(f"{outcome.table}\n", flush=True)
         else:
@@ -145,9 +148,10 @@ def run(experiment: Experiment, asked: argparse.Namespace) -> Outcome:
     hidden = [f"tracking.root={asked.root}", "output=json"]
     if experiment.recordings is not None:
         place = getattr(asked, experiment.recordings)
-        if place is None:
-            return Outcome(None, _left_out(experiment))
-        hidden.append(f"dataset.path={place}" if experiment.recordings == MMM else f"dataset.root={place}")
+        if place is None and experiment.recordings == MMM:
+            return Outcome(None, LEFT_OUT)
+        if place is not None:
+            hidden.append(f"dataset.path={place}" if experiment.recordings == MMM else f"dataset.root={place}")
     command = [sys.executable, "-m", "geomotion_cli", experiment.program, "run", *typed, *hidden]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -188,10 +192,6 @@ def with_table(text: str, name: str, table: str) -> str:
     if pattern.search(text):
         return pattern.sub(lambda _: block, text, count=1)
     return f"{text.rstrip()}\n\n### thesis/{name}\n\n{block}\n"
-
-
-def _left_out(experiment: Experiment) -> str:
-    return f"left out: name its recordings with --{experiment.recordings}"
 
 
 if __name__ == "__main__":

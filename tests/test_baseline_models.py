@@ -35,6 +35,7 @@ def user_module(tmp_path_factory) -> None:
     """A module of the user's on Python's path."""
     folder = tmp_path_factory.mktemp("user")
     (folder / "decaying.py").write_text(SOURCE)
+    (folder / "broken.py").write_text("import no_such_package")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
         yield
@@ -68,6 +69,7 @@ def test_a_users_field_gets_its_settings_and_is_found_again(user_module, tmp_pat
         ("decaying.Nothing", {}, "a module with parameters"),
         ("decaying.nn", {}, "derives from torch.nn.Module"),
         ("decaying.Missing", {}, "derives from torch.nn.Module"),
+        ("broken.Field", {}, "no_such_package"),
     ],
 )
 def test_what_is_no_field_is_refused(user_module, target, settings, words):

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -84,6 +86,15 @@ def test_a_saved_model_gives_the_same_velocities(config, tmp_path):
     x = torch.tensor(GEOMETRY.centre) + 0.05 * torch.randn(7, 2)
     torch.testing.assert_close(loaded.field(x), skill.field(x), rtol=0, atol=0)
     assert (loaded.config, loaded.geometry, loaded.train_demos) == (skill.config, skill.geometry, skill.train_demos)
+
+
+@pytest.mark.parametrize(
+    ("channels", "joints"),
+    [(("joints_rad",), len(GEOMETRY.goal)), (("joints_rad", "position_m"), 0), (("position_m", "joints_rad"), 0)],
+)
+def test_joints_are_counted_where_states_have_no_other_channel(channels, joints):
+    skill = disturbed(next(iter(CONFIGURATIONS.values())))
+    assert replace(skill, state_channels=channels).joints == joints
 
 
 def test_the_seed_decides_the_parameters(config):

@@ -40,7 +40,12 @@ def build_anchored(config: schema.AnchoredField, dim: int) -> VectorField:
 
 def _custom(config: schema.CustomField, dim: int) -> VectorField:
     module, _, name = config.target.rpartition(".")
-    kind = getattr(import_module(module), name, None)
+    try:
+        kind = getattr(import_module(module), name, None)
+    except Exception as error:  # whatever the user's file raises
+        raise InvalidSetting(
+            "field.target", config.target, f"a file that can be imported ({type(error).__name__}: {error})"
+        ) from error
     if not (isinstance(kind, type) and issubclass(kind, nn.Module)):
         raise InvalidSetting("field.target", config.target, f"a class of {module} that derives from torch.nn.Module")
     try:

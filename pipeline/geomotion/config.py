@@ -401,7 +401,7 @@ class GraspAndDropDataset(GeneratedDataset):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _require_positive("dataset", self, "snapshots")
+        _require(self.snapshots >= 2, "dataset.snapshots", self.snapshots, "2 or more: of each place one is held out")
         for name in ("snapshots_on_the_way", "snapshots_between"):
             _require(getattr(self, name) >= 0, f"dataset.{name}", getattr(self, name), "0 or more")
         _require(32 <= self.picture_px <= 224, "dataset.picture_px", self.picture_px, "32 to 224")
@@ -852,7 +852,7 @@ def _source_digest(target: str) -> str:
     _require(all(part.isidentifier() for part in target.split(".")) and module != "", "field.target", target, expected)
     try:
         spec = find_spec(module)
-    except ImportError:
+    except (ImportError, ValueError):  # the second of __main__, which may be no module
         spec = None
     path = Path(spec.origin) if spec is not None and spec.origin is not None else None
     if path is None or path.suffix != ".py":

@@ -93,8 +93,8 @@ class Skill:
 
     @property
     def joints(self) -> int:
-        """How many of the first coordinates of a state are joint positions [rad]."""
-        if self.state_channels[0] != JOINT_CHANNEL:
+        """How many of the first coordinates of a state are joint positions [rad]; 0 beside anything but a pose."""
+        if self.state_channels[0] != JOINT_CHANNEL or (self.pose is None and len(self.state_channels) > 1):
             return 0
         return len(self.geometry.goal) - self.geometry.context - (POSE_DIM if self.pose is not None else 0)
 

@@ -10,6 +10,7 @@ from jaxtyping import UInt8
 
 from geomotion import conditional_models
 from geomotion.conditional_models import ConditionalPolicy, ConditionalSkill
+from geomotion.demos.generators.panda_grasp_and_drop import DOWN_WXYZ
 from geomotion.demos.snapshots import check_pictures, digest_of_picture
 from geomotion.errors import CorruptArtefact
 from geomotion.files import write_tensors
@@ -22,7 +23,6 @@ from geomotion.types import Float, Tensor
 
 Picture = UInt8[np.ndarray, "height width 3"]
 Condition = Float[np.ndarray, " K"]
-DOWN_WXYZ = np.array([0.0, 1.0, 0.0, 0.0])
 SAME_M = 0.05  # sightings nearer to each other than this are of one place
 
 
@@ -105,13 +105,13 @@ class PicturedPolicy:
     def __init__(self, skill: ConditionalSkill, embedding: Embedding, eye: Eye) -> None:
         self.skill, self.embedding, self.eye = skill, embedding.eval(), eye
         self.policy = ConditionalPolicy(skill).eval()
-        self.states = PositionStates(DOWN_WXYZ)
-        self.condition: Condition = np.full(embedding.places, 1 / embedding.places)
+        self.states = PositionStates(np.array(DOWN_WXYZ))
         self.begin()
 
     def begin(self) -> None:
         """Forget what was seen before."""
         self._sighting = Sighting(self.skill.conditioning.goal_at)
+        self.condition: Condition = np.full(self.embedding.places, 1 / self.embedding.places)
 
     @torch.no_grad()
     def look(self, picture: Picture) -> Condition:

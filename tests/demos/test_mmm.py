@@ -82,12 +82,16 @@ def test_a_motion_without_a_root_is_joints_alone(recording):
 
 
 def test_a_motion_is_chosen_by_name_where_several_people_move(recording):
-    path = recording(document(motion(kinematic(TIMES, NAMES)), motion(kinematic(TIMES, NAMES[:2]), name="other")))
+    cup = motion(model_pose(TIMES, [[0, 0, 0]] * 4, [[0, 0, 0]] * 4), name="cup", kind="object")
+    people = motion(kinematic(TIMES, NAMES)), motion(kinematic(TIMES, NAMES[:2]), name="other")
+    path = recording(document(*people, cup))
     with pytest.raises(DatasetError, match=r"several motions with joints \('walk', 'other'\).*dataset.motion="):
         loaded(path)
     assert loaded(path, motion="other").joint_names == NAMES[:2]
     with pytest.raises(UnknownName, match="Did you mean 'other'"):
         loaded(path, motion="othr")
+    with pytest.raises(DatasetError, match="no joint positions in 'cup';"):
+        loaded(path, motion="cup")
 
 
 def test_recordings_with_the_same_joints_in_another_order_are_joined_by_name(recording):
@@ -177,6 +181,8 @@ def test_the_model_beside_the_recording_is_found_and_scaled(recording):
     path = recording(legacy())
     config = MmmDataset(path=path)
     assert read_skeleton(config, read(config)) is None
+    alone = MmmDataset(path=recording(legacy().replace("body.xml", "/"), "mmm.xml"))
+    assert read_skeleton(alone, read(alone)) is None  # neither the recording itself nor a file without a name
     recording(BODY, "body.xml")
     skeleton = read_skeleton(config, read(config))
     assert skeleton is not None

@@ -19,6 +19,7 @@ from geomotion.stages.evaluate import compute
 from geomotion.stages.export import ExportConfig, export
 from geomotion.stages.ingest import SKELETON
 from geomotion.stages.rollout import RolloutStageConfig, rollout
+from geomotion.stages.scene import modulated, space_of
 from geomotion.stages.train import TrainConfig, train
 from geomotion.tracking import Artefacts, StageRun
 
@@ -67,7 +68,7 @@ def selection(channels=None):
 def trained(root, space, channels=None, demonstrations=None):
     storage.save(walking() if demonstrations is None else demonstrations, root / "ingest")
     ingested = {"ingest": Artefacts("ingest", "0", root / "ingest", "")}
-    config = TrainConfig(selection(channels), MODEL, schema.TrajectoryTraining(steps=40), 0, space)
+    config = TrainConfig(selection(channels), MODEL, schema.TrajectoryTraining(steps=2, ramp_steps=1), 0, space)
     train(config, ingested, stage_run(root / "train"))
     return ingested | {"train": Artefacts("train", "1", root / "train", "")}
 
@@ -88,6 +89,16 @@ def test_states_are_joints_and_then_the_pose(skill):
     assert skill.state_channels == (("joints_rad", "pose_m") if skill.pose else ("joints_rad",))
     if skill.pose:
         assert skill.pose.lever_m == 1.0  # a radian of the hip counts as one of a joint
+
+
+def test_obstacles_are_not_put_among_joints(skill):
+    ball = schema.SphereObstacle(centre_m=[0.0, 0.0, 5.0], radius_m=0.1)
+    if skill.pose is None:
+        assert space_of(ball, skill) == 3
+    else:
+        assert modulated(schema.NoObstacle(), skill) is None
+        with pytest.raises(InvalidSetting, match="begin with joints"):
+            modulated(ball, skill)
 
 
 def test_joints_and_poses_are_judged_apart(artefacts, skill):
@@ -113,9 +124,8 @@ def test_rollouts_have_the_channels_of_the_recording(artefacts, skill, tmp_path)
     assert found[0].channels["joint_velocity_rad_per_s"].shape == (40, 3)
 
 
-def test_the_exported_policy_says_what_the_field_says(artefacts, skill, tmp_path, without_shape_checks):
-    if skill.pose is None:
-        return  # five seconds; joints alone are exported elsewhere
+@pytest.mark.parametrize("artefacts", [schema.PoseSpace.RnxR3xSO3], indirect=True)  # others are exported elsewhere
+def test_the_exported_policy_says_what_the_field_says(artefacts, tmp_path, without_shape_checks):
     run = stage_run(tmp_path / "export")
     export(ExportConfig(schema.PolicyConfig()), artefacts, run)
     card = read_json(run.folder / "policy.json")

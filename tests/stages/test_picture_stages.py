@@ -6,7 +6,7 @@ import pytest
 from geomotion import config as schema
 from geomotion.demos import readers, storage
 from geomotion.demos.preprocessing import preprocess
-from geomotion.errors import ShapeMismatch
+from geomotion.errors import InvalidSetting, ShapeMismatch
 from geomotion.files import read_json
 from geomotion.models import ModelConfig
 from geomotion.networks.image_encoder import ImageEncoder
@@ -21,7 +21,7 @@ from geomotion.tracking import Artefacts
 from .presets import running
 
 DATASET = schema.GraspAndDropDataset(
-    name="panda/grasp_and_drop", demos=1, points=60, snapshots=5, snapshots_on_the_way=0, snapshots_between=0,
+    name="panda/grasp_and_drop", demos=1, points=60, snapshots=3, snapshots_on_the_way=3, snapshots_between=0,
     picture_px=32, scenery=0.0,
 )  # fmt: skip
 ENCODER = schema.EncoderConfig(tiles=1, steps=20)
@@ -47,7 +47,7 @@ def done(tmp_path_factory):
     for skill in schema.ManipulationSkill:
         chosen = schema.DatasetConfig(DATASET.name, None, *DATASET.demos_of(skill))
         training = schema.TrajectoryTraining(
-            steps=30, ramp_steps=5, starts=2, times=8, curve_points=16, velocity_points=64, haste_points=16
+            steps=3, ramp_steps=1, starts=2, times=8, curve_points=16, velocity_points=64, haste_points=16
         )
         produce(f"train {skill.value}", train, TrainConfig(chosen, MODEL, training, 0), found)
         trained = found | {"train": found[f"train {skill.value}"]}
@@ -68,8 +68,9 @@ def test_random_weights_are_named_wherever_features_are_used(done):
 
 
 def test_the_same_scene_without_variation_is_told_right(done):
-    judged = read_json(done["embed grasp"].path("embedding.json"))["held_out"]
-    assert judged["place_accuracy"] == 1.0 and judged["confusion"] == np.eye(3, dtype=int).tolist()
+    for skill, looks in (("grasp", 2), ("drop", 1)):  # before the grasp with the hand at rest, and on its way
+        judged = read_json(done[f"embed {skill}"].path("embedding.json"))["held_out"]
+        assert judged["place_accuracy"] == 1.0 and judged["confusion"] == (looks * np.eye(3, dtype=int)).tolist()
 
 
 def test_every_condition_has_a_certificate(done):
@@ -79,7 +80,9 @@ def test_every_condition_has_a_certificate(done):
 
 @pytest.mark.slow
 def test_episodes_are_counted_and_filmed(done, tmp_path):
-    few = schema.EpisodesConfig(per_place=0, between=0, moved=1, looks_per_s=1.0, film_fps=0.5)
+    few = schema.EpisodesConfig(
+        per_place=0, between=0, moved=1, control_hz=10.0, looks_per_s=2.0, look_until_m=0.01, film_fps=0.5
+    )
     run = running(tmp_path / "episodes")
     episodes(EpisodesStageConfig(few, DATASET, SEEN_BY), done, run)
     document = read_json(run.folder / "episodes.json")
@@ -89,6 +92,18 @@ def test_episodes_are_counted_and_filmed(done, tmp_path):
     assert document["groups"]["moved"]["succeeded"] == row["succeeded"]
     assert "moved to another place" in episodes_table(document)
     assert (run.folder / "film.gif").stat().st_size > 0
+
+
+def test_other_weights_than_those_of_the_training_are_refused(done, tmp_path):
+    changed = EpisodesStageConfig(schema.EpisodesConfig(), DATASET, EncodeConfig("random", ENCODER.tiles, seed=1))
+    with pytest.raises(InvalidSetting, match=r"encoder\.weights.*changed since"):
+        episodes(changed, done, running(tmp_path / "episodes"))
+
+
+def test_a_policy_that_begins_again_has_seen_nothing(policy):
+    policy.look(np.full((32, 32, 3), 200, np.uint8))
+    policy.begin()
+    np.testing.assert_array_equal(policy.condition, np.full(3, 1 / 3))
 
 
 def test_pictures_of_another_size_are_refused(policy):

@@ -61,18 +61,25 @@ def test_what_each_seed_judged_widens_the_interval_and_a_maximum_has_no_such_val
     assert bootstrap_interval([one]) is None
 
 
-@pytest.mark.parametrize("moved", [0.0, 0.1])
+def test_more_seeds_do_not_make_up_for_few_demonstrations():
+    values = np.random.default_rng(4).normal(5.0, 2.0, 50)
+    interval = bootstrap_interval([{"statistic": "mean", "value": values.mean(), "values": list(values)}] * 50)
+    expected = values.mean() + np.array([-1.96, 1.96]) * values.std() / 50**0.5
+    np.testing.assert_allclose(interval, expected, atol=0.1)
+
+
+@pytest.mark.parametrize("moved", [0.0, 1e-6, 0.1])
 def test_methods_that_start_elsewhere_are_named(tmp_path, moved):
     cells = [Cell(name, "letters/j", 0, []) for name in ("plain", "ours")]
     for number, cell in enumerate(cells):
         (tmp_path / cell.variant).mkdir()
-        path = np.zeros((5, 2)) + number * moved
-        path[1:] += number  # where motions go is their own matter
-        np.savez(tmp_path / cell.variant / "evaluation.npz", rollout_0=path, goal_starts=np.ones((4, 2)))
+        paths = np.stack([np.zeros((5, 2)), np.ones((5, 2)) + number * moved])
+        paths[:, 1:] += number  # where motions go is their own matter
+        np.savez(tmp_path / cell.variant / "evaluation.npz", region_rollouts=paths, demo_0=np.ones((4, 2)))
     starts, differing = initial_conditions([(cell, tmp_path / cell.variant) for cell in cells])
-    np.testing.assert_array_equal(starts["letters/j, seed 0/rollout_0"], [[0, 0]])
-    assert starts["letters/j, seed 0/goal_starts"].shape == (4, 2)
-    assert [one.partition(",")[0] for one in differing] == (["ours"] if moved else [])
+    np.testing.assert_array_equal(starts["letters/j, seed 0/region_rollouts"], [[0, 0], [1, 1]])
+    np.testing.assert_array_equal(starts["letters/j, seed 0/demo_0"], [[1, 1]])
+    assert [one.partition(",")[0] for one in differing] == (["ours"] if moved == 0.1 else [])
 
 
 def test_references_are_left_out_where_none_applies():

@@ -87,6 +87,8 @@ class TestMerging:
         assert execute(own, Stage("train", here), {"seed": 1}).run_id == found.run_id
         execute(own, Stage("train", here), {"seed": 2})
         assert here.calls == 1
+        execute(own, Stage("train", here), {"seed": 1}, reuse=False)
+        assert here.calls == 2
 
     def test_a_folder_without_results_is_named(self, tmp_path):
         with pytest.raises(MissingData, match=r"tracking\.merge"):

@@ -1,1 +1,1 @@
-"""Fields without any promise, which contracting ones are compared with."""
+"""Methods of others and fields without any promise, which contracting ones are compared with."""

@@ -44,7 +44,7 @@ class StochasticDrift(nn.Module):
             f"in its training enforces; here its largest eigenvalue has the real part {real:.3g} per duration."
         )
         if self.is_saturated:
-            return f"{text} Where the drift saturates, the distance between trajectories in z stays as it is."
+            return f"{text} Where the drift saturates, neighbouring trajectories stay as far apart in z as they are."
         return (
             f"{text} The drift is linear, so it contracts in z if the symmetric part of that matrix is negative "
             f"definite, and nowhere otherwise: its largest eigenvalue is {symmetric:.3g} per duration."

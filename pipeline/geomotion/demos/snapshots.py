@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from geomotion.errors import CorruptArtefact, ShapeMismatch
 from geomotion.files import atomic
@@ -30,7 +30,7 @@ class Snapshots:
     pictures: Pictures
     place: Int[np.ndarray, " picture"]
     object_m: Float[np.ndarray, "picture 2"]
-    is_on_the_way: np.ndarray
+    is_on_the_way: Bool[np.ndarray, " picture"]
 
     def __len__(self) -> int:
         return len(self.pictures)

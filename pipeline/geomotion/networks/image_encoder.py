@@ -39,7 +39,7 @@ class ImageEncoder(nn.Module):
 
     Raises:
         MissingData: If there are no such weights; names the command that gets them.
-        InvalidSetting: If the network has other outputs.
+        InvalidSetting: If they cannot be read, are those of another network, or not all of this one.
     """
 
     def __init__(self, weights: str, tiles: int = 1, seed: int = 0) -> None:
@@ -91,20 +91,24 @@ def _random(seed: int) -> Any:
 def _stored(weights: str) -> Any:
     from transformers import ResNetForImageClassification
 
+    read: Any = ResNetForImageClassification.from_pretrained
     folder = Path(weights).expanduser()
     is_folder = folder.is_dir() or weights.startswith((".", "/", "~"))
     try:
         where = str(folder) if is_folder else weights
-        network = ResNetForImageClassification.from_pretrained(where, local_files_only=True)
+        network, loaded = read(where, local_files_only=True, output_loading_info=True, ignore_mismatched_sizes=True)
     except (OSError, ValueError) as error:
         command = f"{HUB_NAME} --local-dir {folder}" if is_folder else weights
         how = f"Get them where there is a network: `hf download {command}`. Untrained ones: encoder.weights=random."
         raise MissingData(f"ResNet-18 weights {weights!r}", how) from error
+    except Exception as error:  # the library that reads them has a type of its own for damage
+        raise InvalidSetting("encoder.weights", weights, f"weights that can be read ({error})") from error
+    expected = f"ResNet-18 with {FEATURES} outputs"
     outputs = network.config.num_labels
     if outputs != FEATURES:
-        raise InvalidSetting(
-            "encoder.weights", weights, f"a network with {FEATURES} outputs, as ResNet-18; it has {outputs}"
-        )
+        raise InvalidSetting("encoder.weights", weights, f"{expected}; this network has {outputs}")
+    if lacking := [*loaded["missing_keys"], *(str(name) for name, *_ in loaded["mismatched_keys"])]:
+        raise InvalidSetting("encoder.weights", weights, f"{expected}; these lack {', '.join(sorted(lacking)[:3])}")
     return network
 
 

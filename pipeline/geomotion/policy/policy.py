@@ -69,7 +69,7 @@ class Policy(nn.Module):
         is_inside = self.training_range.contains(x, conditions)
         status = torch.where(is_defined, torch.where(is_inside, Status.ok, Status.outside), Status.undefined)
         trusted = tuple(torch.where(is_defined[..., None], one, 0) for one in velocities)
-        offset = self._offset(x, z)
+        offset = self._offset(x, z, given)
         return (*trusted, status) if offset is None else (*trusted, status, offset.norm(dim=-1))
 
     def _state(self, given: Mapping[str, Tensor]) -> tuple[State, Bool[Tensor, "*batch"]]:
@@ -106,10 +106,11 @@ class Policy(nn.Module):
         parts = [self.embedded.field(along), -given[ports.TRANSVERSE_RATE] * across]
         return torch.cat([*parts, torch.zeros_like(z[..., self.embedded.dim :])], -1)
 
-    def _offset(self, x: State, z: Tensor) -> Tensor | None:
+    def _offset(self, x: State, z: Tensor, given: Mapping[str, Tensor]) -> Tensor | None:
         """z_e in the size of the demonstrations [m]; None for skills of all dimensions."""
         if self.embedded is not None:
-            return self.scale_m * z[..., self.embedded.skill_dim : self.embedded.dim]
+            own = self.scale_m * z[..., self.embedded.skill_dim : self.embedded.dim]
+            return own if self.conditional is None else own * self.conditional.units(given[ports.CONDITION])[0]
         if self.decoder is not None:
             return self.decoder.scaling.scale * self.decoder.split(x)[1]
         return None

@@ -1,7 +1,7 @@
 """An episode: look, grasp, look, drop, in closed loop. Contacts and the place of the object decide what came of it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol, runtime_checkable
 
@@ -12,13 +12,12 @@ from geomotion.robot.disturbances import Measured
 from geomotion.robot.film import Film, Frame
 from geomotion.robot.rehearsed import wait
 from geomotion.robot.resolved_rate import Joints, ResolvedRate, TipVelocity
-from geomotion.robot.tabletop import CLOSED_M, OPEN_M, Tabletop
+from geomotion.robot.tabletop import CLOSED_M, CLOSING_S, FALLING_S, OPEN_M, Tabletop
 from geomotion.robot.timed import RATE_HZ
 from geomotion.types import Float
 
 NEAR_M, SLOW_M_PER_S = 0.006, 0.02  # of the goal that the policy sees, and slower than this: the motion is over
 LONGEST_S = 8.0  # of one motion
-CLOSING_S, FALLING_S = 0.5, 1.0
 LIFTED_M = 0.05  # the object counts as lifted where both fingers hold it at least as high above where it lay
 
 Vector = Float[np.ndarray, "3"]
@@ -79,7 +78,6 @@ class Episode:
         duration_s: Of the whole.
         looks: Pictures that were taken.
         conditions: What the first look of each skill gave.
-        position_m: Of the tip in every control period.
     """
 
     outcome: Outcome
@@ -88,7 +86,6 @@ class Episode:
     duration_s: float
     looks: int
     conditions: tuple[tuple[float, ...], ...]
-    position_m: Float[np.ndarray, "period 3"]
 
     @property
     def succeeded(self) -> bool:
@@ -121,7 +118,6 @@ class Episodes:
     film: Film | None = None
     _time_s: float = 0.0
     _looks: int = 0
-    _path: list[Vector] = field(default_factory=list)
 
     def run(self, moves: tuple[Move, ...] = ()) -> Episode:
         """One episode, from the arm at rest and the object where it lies now.
@@ -133,7 +129,7 @@ class Episodes:
             InvalidSetting: If the control rate does not divide 240 Hz.
         """
         tabletop = self.tabletop
-        self._time_s, self._looks, self._path = 0.0, 0, []
+        self._time_s, self._looks = 0.0, 0
         tabletop.put_arm(self.rest_rad)
         waiting = list(moves)
 
@@ -168,7 +164,6 @@ class Episodes:
             self._time_s,
             self._looks,
             conditions,
-            np.array(self._path),
         )
 
     def _judged(self, was_lifted: bool, was_held: bool) -> Outcome:
@@ -192,7 +187,6 @@ class Episodes:
             joints, _ = scene.joints()
             tip_m, orientation = scene.end_effector_pose()
             watch(period * period_s, tip_m)
-            self._path.append(tip_m)
             wanted = policy(Measured(tip_m, orientation, joints), period * period_s)
             if (
                 np.linalg.norm(tip_m - policy.goal_m) < NEAR_M

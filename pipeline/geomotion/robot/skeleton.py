@@ -84,8 +84,8 @@ class Skeleton:
         ]
 
     def known(self, joint_names: Sequence[str]) -> list[str]:
-        """Those of the names that are joints here."""
-        names = {node.name for node in self.nodes}
+        """Those of the names that are joints here, which move something."""
+        names = {node.name for node in self.nodes if node.kind != FIXED}
         return [name for name in joint_names if name in names]
 
     def document(self) -> list[dict[str, Any]]:

@@ -29,6 +29,7 @@ BIN_M, BIN_HALF_M, BIN_HEIGHT_M, BIN_WALL_M = (0.34, -0.46), 0.09, 0.10, 0.004
 BIN_COLOUR = (0.35, 0.45, 0.60, 1.0)
 FINGERS = ("panda_leftfinger", "panda_rightfinger")
 OPEN_M, CLOSED_M = 0.04, 0.0  # of each finger's joint
+CLOSING_S, FALLING_S = 0.5, 1.0  # that the hand waits until its fingers are closed, and the object has fallen
 LYING_M = 0.001  # gap under the object when it is put down
 FINGER_FRICTION = 1.0
 

@@ -50,6 +50,7 @@ def judge_nearby(
     note = f"{len(starts)} rollouts, {len(euclidean)} pairs, {len(times_s)} times over {times_s[-1]:.3g} s"
     scores = distance_scores(euclidean, "nearby.euclidean", note) | distance_scores(claimed, "nearby.claimed", note)
     arrays = {
+        "nearby_starts": starts,
         "nearby_time": times_s,
         "nearby_euclidean": euclidean.mean(axis=0),
         "nearby_claimed": claimed.mean(axis=0),

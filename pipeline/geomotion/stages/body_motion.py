@@ -13,7 +13,7 @@ from geomotion.demos.demonstrations import Array, Demonstrations, Trajectory
 from geomotion.demos.pose_vectors import with_pose_vectors
 from geomotion.figures.body import BodyPicture, figure_body, film_frames
 from geomotion.figures.style import save_figure
-from geomotion.files import read_json, write_json
+from geomotion.files import read_json
 from geomotion.models import Skill
 from geomotion.robot.film import save_gif
 from geomotion.robot.skeleton import Skeleton
@@ -39,7 +39,6 @@ def draw_body_motion(config: BodyConfig, inputs: Mapping[str, Artefacts], run: S
     save_figure(figure_body(picture, config.snapshots), run.folder / "figures", "body", picture.arrays())
     if config.film:
         save_gif(film_frames(picture, config.film_fps), run.folder / "film.gif", config.film_fps)
-    write_json(run.folder / "body.json", {"motions": list(picture.led), "joints": skill.joints})
 
 
 def body_picture(config: BodyConfig, skill: Skill, skeleton: Skeleton, demonstrations: Demonstrations) -> BodyPicture:

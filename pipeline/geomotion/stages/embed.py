@@ -65,11 +65,13 @@ def embed(config: EmbedConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
 
 
 def _held_out(pictures: Snapshots) -> np.ndarray:
-    """The last of each kind."""
+    """The last of each place, with the hand at rest and on its way: one of five, or of fewer one, unless it is all."""
     is_test = np.zeros(len(pictures), dtype=bool)
-    for place in np.unique(pictures.place):
-        rows = np.flatnonzero(pictures.place == place)
-        is_test[rows[len(rows) - len(rows) // TEST_EVERY :]] = True
+    kinds = 2 * pictures.place + pictures.is_on_the_way
+    for kind in np.unique(kinds):
+        rows = np.flatnonzero(kinds == kind)
+        count = min(max(1, len(rows) // TEST_EVERY), len(rows) - 1)
+        is_test[rows[len(rows) - count :]] = True
     return is_test
 
 
@@ -88,20 +90,15 @@ def _shown(skill: ConditionalSkill, inputs: Mapping[str, Artefacts]) -> Shown:
 @torch.no_grad()
 def _judged(embedding: Embedding, seen: Seen, object_m: np.ndarray) -> dict[str, Any]:
     """Confusion of places, and how far from the object the condition says that it is."""
-    classes = embedding.scores(seen.features).argmax(-1).numpy()
+    scores = embedding.scores(seen.features).numpy()
     place, count = seen.place.numpy(), embedding.places
-    truth = np.where(place == BETWEEN, count, place)
-    kinds = count + int(embedding.knows_elsewhere)
-    confusion = np.zeros((kinds, kinds), dtype=int)
-    known = truth < kinds
-    np.add.at(confusion, (truth[known], classes[known]), 1)
+    confusion = np.zeros((scores.shape[1],) * 2, dtype=int)
+    np.add.at(confusion, (np.where(place == BETWEEN, count, place), scores.argmax(-1)), 1)
     apart_m = np.linalg.norm(embedding(seen.features).double().numpy() @ PLACES_M - object_m, axis=1)
     found: dict[str, Any] = {"confusion": confusion.tolist()}
     for name, rows in (("places", place != BETWEEN), ("between", place == BETWEEN)):
         if rows.any():
             median, high = np.quantile(apart_m[rows], [0.5, 0.95])
             found[name] = {"pictures": int(rows.sum()), "median_m": float(median), "95_percent_m": float(high)}
-    at_places = place != BETWEEN
-    scores = embedding.scores(seen.features)[:, :count].argmax(-1).numpy()
-    found["place_accuracy"] = float((scores == place)[at_places].mean())
+    found["place_accuracy"] = float((scores[:, :count].argmax(-1) == place)[place != BETWEEN].mean())
     return found

@@ -10,6 +10,7 @@ import numpy as np
 from geomotion.config import GRASP_PLACES, EpisodesConfig, GraspAndDropDataset
 from geomotion.demos.generators.grasp_and_drop_pictures import anywhere_between
 from geomotion.demos.generators.panda_grasp_and_drop import DOWN_WXYZ, PLACES_M, REST_M, put
+from geomotion.errors import InvalidSetting
 from geomotion.figures.episodes import save_episodes_figure
 from geomotion.files import read_json, write_json
 from geomotion.networks.image_encoder import ImageEncoder
@@ -70,9 +71,14 @@ def episodes(config: EpisodesStageConfig, inputs: Mapping[str, Artefacts], run: 
 
     Raises:
         MissingData: If there are no weights of the encoder any more.
+        InvalidSetting: If they are not those by which pictures were encoded.
     """
-    settings, encoder = config.episodes, config.encoder
-    eye = Eye(ImageEncoder(encoder.weights, encoder.tiles, encoder.seed), config.dataset.picture_px)
+    settings, seeing = config.episodes, read_json(inputs["encode"].path("encoder.json"))
+    encoder = ImageEncoder(config.encoder.weights, config.encoder.tiles, config.encoder.seed)
+    if encoder.digest != seeing["weights_sha256"]:
+        expected = "the weights that policies were trained with; these have changed since: set reuse=false"
+        raise InvalidSetting("encoder.weights", config.encoder.weights, expected)
+    eye = Eye(encoder, config.dataset.picture_px)
     grasp, drop = (
         load_policy(inputs[f"train {name}"].path("model.pt"), inputs[f"embed {name}"].path("embedding.pt"), eye)
         for name in ("grasp", "drop")
@@ -91,7 +97,7 @@ def episodes(config: EpisodesStageConfig, inputs: Mapping[str, Artefacts], run: 
             rows.append(_row(one, loop.run(one.moves)))
     film.save(run.folder / "film.gif")
     document = {
-        "encoder": read_json(inputs["encode"].path("encoder.json")),
+        "encoder": seeing,
         "groups": {name: _counted([row for row in rows if row["group"] == name]) for name in GROUPS},
         "episodes": rows,
     }

@@ -7,6 +7,7 @@ from geomotion.config import GraspAndDropDataset, ManipulationSkill, NcdsConfig
 from geomotion.errors import InvalidSetting
 from geomotion.files import read_json
 from geomotion.networks.image_encoder import RANDOM, ImageEncoder
+from geomotion.robot.closed_loop import steps_per_period
 from geomotion.stages.embed import EmbedConfig, embed
 from geomotion.stages.encode import EncodeConfig, encode
 from geomotion.stages.episodes import EpisodesStageConfig, episodes, episodes_table
@@ -28,19 +29,7 @@ def _dataset(session: Session) -> GraspAndDropDataset:
 
 def _pictured(session: Session) -> GraspAndDropDataset:
     """The dataset as far as pictures depend on it."""
-    of, plain = _dataset(session), GraspAndDropDataset
-    return plain(
-        name=of.name,
-        demos=of.demos,
-        held_out=of.held_out,
-        variation=of.variation,
-        seed=of.seed,
-        snapshots=of.snapshots,
-        snapshots_on_the_way=of.snapshots_on_the_way,
-        snapshots_between=of.snapshots_between,
-        picture_px=of.picture_px,
-        scenery=of.scenery,
-    )
+    return replace(_dataset(session), skill=ManipulationSkill.grasp, train_demos=None, test_demos=None)
 
 
 def _encode_config(session: Session) -> EncodeConfig:
@@ -68,12 +57,14 @@ def run_pictured(session: Session) -> VerbResult:
     """Train both policies and their embeddings, score both, and let them act.
 
     Raises:
-        InvalidSetting: If demonstrations were chosen by number, which would be those of one skill alone.
+        InvalidSetting: If demonstrations were chosen by number, which would be those of one skill alone, or the control
+            rate does not divide that of the simulation; before anything is done.
         MissingData: If there are no such weights of the encoder; before anything is done.
     """
     dataset = _dataset(session)
     if (dataset.train_demos, dataset.test_demos) != dataset.demos_of(dataset.skill):
         raise InvalidSetting("dataset.train_demos", dataset.train_demos, "null: `run` trains both skills; see held_out")
+    steps_per_period(session.config.episodes.control_hz, "episodes.control_hz")
     seeing = _encode_config(session)
     if seeing.weights != RANDOM:
         ImageEncoder(seeing.weights)

@@ -13,13 +13,12 @@ from geomotion.dynamics.rollout import rollout
 from geomotion.errors import InvalidSetting
 from geomotion.models import Skill
 from geomotion.obstacles.safe_field import PLANE, follow_safely
-from geomotion.obstacles.solids import SPACE
 from geomotion.safe_skills import SafeSkill, safe_skill
 from geomotion.scores.evaluation import Evaluation, combine
 from geomotion.scores.grids import bounding_box
 from geomotion.scores.safety import Passage, judge_passages, judge_safe_contraction
 from geomotion.scores.score import Score, share_score
-from geomotion.stages.scene import moving_bodies
+from geomotion.stages.scene import moving_bodies, space_of
 from geomotion.types import Float, Trajectories
 
 STEPS_PER_DURATION = 100
@@ -45,7 +44,7 @@ def safe(
         return None
     if not isinstance(skill, Skill):
         raise InvalidSetting("safety", "riemannian", "none for a skill with conditions: each would have its own region")
-    bodies = moving_bodies(obstacle, skill.field.dim if skill.pose is None else SPACE)
+    bodies = moving_bodies(obstacle, space_of(obstacle, skill))
     states = [demonstrations[number].state(skill.state_channels) for number in skill.train_demos]
     return safe_skill(skill, states, bodies, config)
 

@@ -33,7 +33,20 @@ def modulated(config: schema.ObstacleConfig, skill: Skill) -> ModulatedField | N
     Raises:
         InvalidSetting: If an obstacle does not fit the state, or one at rest covers the goal.
     """
-    return around_obstacles(config, skill.field, skill.goal, len(skill.goal) if skill.pose is None else SPACE)
+    return around_obstacles(config, skill.field, skill.goal, space_of(config, skill))
+
+
+def space_of(config: schema.ObstacleConfig, skill: Skill) -> int:
+    """How many of the first coordinates of a state are the position that obstacles stand in the way of.
+
+    Raises:
+        InvalidSetting: If there are obstacles, and a state begins with joints and ends with a pose.
+    """
+    if skill.pose is None:
+        return len(skill.goal)
+    if skill.joints and solids(config):
+        raise InvalidSetting("obstacle", "beside joints", "free: these states begin with joints, not with a position")
+    return SPACE
 
 
 def around_obstacles(

@@ -84,7 +84,7 @@ def legend(document: Document) -> list[str]:
     if len(document["seeds"]) > 1:
         found.append(
             f"mean ± standard deviation over {len(document['seeds'])} seeds [{CONFIDENCE:.0%} bootstrap interval of "
-            "the mean, over seeds and what each one judged]"
+            "the mean, over seeds and what they judged]"
         )
     return found
 
@@ -109,19 +109,22 @@ def _over_seeds(scores: Sequence[Document | None]) -> dict[str, Any] | None:
 def bootstrap_interval(scores: Sequence[Document]) -> list[float] | None:
     """Percentile interval of a mean over seeds, each of which is a mean over what it judged.
 
-    Seeds are drawn with replacement, then the values of each drawn seed; None where there is one seed.
+    Every seed judges the same demonstrations, or starts. So these are drawn with replacement once for all seeds: drawn
+    for each seed anew, their differences would seem to average out with the number of seeds. Seeds alone are drawn
+    where a score is no mean, or has too many values to be kept; None where there is one seed.
+
+    Source: Owen, 2007, The pigeonhole bootstrap.
     """
     if len(scores) < 2:
         return None
-    own = [
-        score["values"] if score["statistic"] == "mean" and score["values"] else [score["value"]] for score in scores
-    ]
-    if any(value is None for values in own for value in values):
+    kept = [score["values"] if score["statistic"] == "mean" else [] for score in scores]
+    has_same = len({len(values) for values in kept}) == 1 and len(kept[0]) > 0
+    values = np.array(kept if has_same else [[score["value"]] for score in scores], dtype=float)  # (seed, judged)
+    if not np.isfinite(values).all():
         return None
     generator = np.random.default_rng(0)
-    means = np.stack([generator.choice(values, (RESAMPLED, len(scores), len(values))).mean(-1) for values in own])
-    drawn = generator.integers(len(own), size=(RESAMPLED, len(scores)))
-    resampled = means[drawn, np.arange(RESAMPLED)[:, None], np.arange(len(scores))].mean(axis=1)
+    seeds, judged = (generator.integers(count, size=(RESAMPLED, count)) for count in values.shape)
+    resampled = values[seeds[:, :, None], judged[:, None, :]].mean(axis=(1, 2))
     tail = (1 - CONFIDENCE) / 2
     return [float(end) for end in np.quantile(resampled, (tail, 1 - tail))]
 

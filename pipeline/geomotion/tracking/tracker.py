@@ -98,15 +98,16 @@ class Tracker:
             artefacts.verify()
         key = run_key(stage.name, config, inputs)
         with self._computing(stage.name, key):
-            found = self._finished(key) if self.reuse and not stage.reads_outside else None
-            if found is None and not stage.reads_outside:
+            may_be_known = self.reuse and not stage.reads_outside
+            found = self._finished(key) if may_be_known else None
+            if found is not None:
+                logger.info("%s: reused run %s", stage.name, found.run_id[:8])
+            elif may_be_known:
                 found = self._taken_over(stage, config, inputs, parent, key)
             if found is None:
                 begun = time.monotonic()
                 found = self._execute(stage, config, inputs, parent, key)
                 logger.info("%s: done in %.1f s", stage.name, time.monotonic() - begun)
-            else:
-                logger.info("%s: reused run %s", stage.name, found.run_id[:8])
         self.link(parent, {stage.name: found})
         return found
 

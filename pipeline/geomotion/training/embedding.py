@@ -63,7 +63,7 @@ class Embedding(nn.Module):
         return scores
 
     def normal(self, features: Float[Tensor, "*batch feature"]) -> Float[Tensor, "*batch feature"]:
-        """Each feature with mean 0 and standard deviation 1 over training pictures, all together of unit variance."""
+        """Features of mean 0 and equal variances over training pictures, which add up to one."""
         scaled: Tensor = (features - self.mean) / (self.std * features.shape[-1] ** 0.5)
         return scaled
 

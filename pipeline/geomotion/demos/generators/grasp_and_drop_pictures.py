@@ -8,7 +8,7 @@ import numpy as np
 
 from geomotion.config import GRASP_PLACES, GraspAndDropDataset, ManipulationSkill
 from geomotion.demos.demonstrations import Array, Demonstrations
-from geomotion.demos.generators.panda_grasp_and_drop import CLOSING_S, DOWN_WXYZ, GRASP_M, PLACES_M, put
+from geomotion.demos.generators.panda_grasp_and_drop import DOWN_WXYZ, GRASP_M, PLACES_M, put
 from geomotion.demos.snapshots import BETWEEN, Snapshots
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def _arrange(tabletop: "Tabletop", situation: Situation) -> None:
     from geomotion.robot.inverse_kinematics import solve_pose
     from geomotion.robot.panda import HOME_RAD
     from geomotion.robot.rehearsed import wait
-    from geomotion.robot.tabletop import CLOSED_M
+    from geomotion.robot.tabletop import CLOSED_M, CLOSING_S
 
     if situation.joints_rad is not None:
         tabletop.put_arm(situation.joints_rad)

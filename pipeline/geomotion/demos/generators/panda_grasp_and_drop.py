@@ -31,7 +31,6 @@ NO_TURN = (0.0, 1.0)
 GRASP_HABITS = Habits(position_m=Spread(0.010, 0.008, 0.0015), orientation_rad=Spread(0.0, 0.0, 0.0))
 DROP_HABITS = Habits(position_m=Spread(0.0, 0.010, 0.006), orientation_rad=Spread(0.0, 0.0, 0.0))
 PLACE_STD_M, TURN_STD_RAD = 0.003, 0.10  # how exactly a person puts the object where it belongs
-CLOSING_S, FALLING_S = 0.5, 1.0
 SOLVED_POSES = 100  # of a motion, by inverse kinematics; joints follow a spline between them
 NAMES = tuple(f"place_{number}" for number in range(1, GRASP_PLACES + 1))
 WHAT = "grasp and drop on the simulated Panda"
@@ -84,7 +83,7 @@ def put(place_m: Array, config: GraspAndDropDataset, generator: np.random.Genera
 
 def _demonstrate(tabletop: "Tabletop", config: GraspAndDropDataset, place: int, number: int) -> Repetition:
     from geomotion.robot.rehearsed import wait
-    from geomotion.robot.tabletop import CLOSED_M, OPEN_M
+    from geomotion.robot.tabletop import CLOSED_M, CLOSING_S, FALLING_S, OPEN_M
 
     where, turn_rad = put(PLACES_M[place], config, np.random.default_rng((config.seed, number, 1)))
     tabletop.put_object(where, turn_rad)

@@ -76,7 +76,7 @@ def chosen_motion(path: Path, name: str | None) -> Motion:
             raise UnknownName(f"motion of {path.name}", name, [one.name for one in motions])
     else:
         found = [one for one in motions if one.kinematic]
-    names = ", ".join(repr(one.name) for one in motions)
+    names = ", ".join(repr(one.name) for one in found or motions)
     if len(found) > 1:
         raise DatasetError(path, f"has several motions with joints ({names}); choose one with dataset.motion=")
     if not found or not found[0].kinematic:
@@ -96,7 +96,7 @@ def read_skeleton(config: MmmDataset, demonstrations: Demonstrations) -> Skeleto
     if config.skeleton is not None:
         path = Path(config.skeleton).expanduser()
     else:
-        names = dict.fromkeys((*([Path(motion.model).name] if motion.model else []), *MODEL_FILES))
+        names = [name for name in (Path(motion.model).name, *MODEL_FILES) if name not in ("", recording.name)]
         found = [recording.with_name(name) for name in names if recording.with_name(name).is_file()]
         if not found:
             return None
@@ -190,7 +190,7 @@ def _at(wanted_s: Array, time_s: Array, values: Array) -> Array:
 def _turned(wanted_s: Array, time_s: Array, rotation: "Rotation") -> "Rotation":
     from scipy.spatial.transform import Slerp
 
-    return Slerp(time_s, rotation)(np.clip(wanted_s, time_s[0], time_s[-1])) if len(time_s) > 1 else rotation
+    return Slerp(time_s, rotation)(np.clip(wanted_s, time_s[0], time_s[-1]))
 
 
 def _refuse_gaps(series: Series, path: Path, motion: str) -> None:
