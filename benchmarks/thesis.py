@@ -103,7 +103,7 @@ EXPERIMENTS = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of an experiment: its table, or why there is none."""
+    """What became of an experiment: its table, and what went wrong; without a table, why there is none."""
 
     table: str | None
     failure: str | None = None
@@ -129,10 +129,12 @@ def main() -> int:
     wanted = [one for one in EXPERIMENTS if not asked.only or one.name in asked.only]
     pool = ThreadPoolExecutor(asked.jobs)
     for experiment, outcome in zip(wanted, pool.map(partial(run, asked=asked), wanted), strict=True):
-        if outcome.table is None:
+        if outcome.failure is not None:
             print(f"{experiment.name}: {outcome.failure}", file=sys.stderr, flush=True)
             failed += [] if outcome.failure == LEFT_OUT else [experiment.name]
-        elif asked.results is None:
+        if outcome.table is None:
+            continue
+        if asked.results is None:
             print(f"{outcome.table}\n", flush=True)
         else:
             write_text(asked.results, with_table(asked.results.read_text("utf-8"), experiment.name, outcome.table))
@@ -158,12 +160,14 @@ def run(experiment: Experiment, asked: argparse.Namespace) -> Outcome:
     said = process.stdout.read()
     _, status, used = os.wait4(process.pid, 0)
     exit_code = os.waitstatus_to_exitcode(status)
-    if exit_code not in (0, NO_MOTION):
-        return Outcome(None, f"failed with exit status {exit_code}")
+    failure = None if exit_code in (0, NO_MOTION) else f"failed with exit status {exit_code}"
+    document = json.loads(said) if said.strip() else {}
+    if failure is not None and "study" not in document:  # the table of a study stands though some cells failed
+        return Outcome(None, failure)
     seconds = used.ru_utime + used.ru_stime
     shown = shlex.join([experiment.program, "run", *typed])
-    found = "\n".join(tables(json.loads(said), experiment.scores))
-    return Outcome(f"`{shown}`, {seconds:.0f} s of CPU (less where stages were reused)\n\n{found}")
+    found = "\n".join(tables(document, experiment.scores))
+    return Outcome(f"`{shown}`, {seconds:.0f} s of CPU (less where stages were reused)\n\n{found}", failure)
 
 
 def tables(document: dict[str, Any], patterns: Sequence[str]) -> Iterator[str]:

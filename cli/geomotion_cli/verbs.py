@@ -67,6 +67,11 @@ _PLANNING = {
     "mesh, point_cloud, several",
 }
 _COMPARE = Verb(
+    "table of the scores of several runs",
+    {"runs=[ID,ID]": "MLflow run ids, paths or latest", **_JSON},
+    ("runs=[latest,0f3a]", "runs=[0f3a,77c1] output=json"),
+)
+_COMPARE_FIELDS = Verb(
     "table of the scores of several runs, or of every cell of a study",
     {
         "runs=[ID,ID]": "MLflow run ids, paths or latest",
@@ -237,7 +242,7 @@ PROGRAMS = {
                 ),
             ),
             "report": Verb("write one HTML page about a run", {**_RUN, **_STORE}, ("run=latest",)),
-            "compare": _COMPARE,
+            "compare": _COMPARE_FIELDS,
             "check": _CHECK,
             "ui": _UI,
         },
