@@ -31,6 +31,8 @@ def run_study(session: Session, verb: str) -> VerbResult:
         if figure not in program.study_figures:
             raise UnknownName("study figure", figure, program.study_figures)
     cells = compose_cells(program.name, study, session.overrides)
+    if study.shards > len(cells):
+        raise InvalidSetting("study.shards", study.shards, f"{len(cells)} at most, the number of cells")
     if study.shard is not None:
         cells = cells[study.shard :: study.shards]
     outcomes: dict[str, Outcome] = {}

@@ -184,6 +184,7 @@ class Tracker:
             self.client.log_artifacts(run_id, str(other.folder))
             self.client.set_tag(run_id, MERGED, other.run.info.run_id)
             self.client.set_tag(run_id, DIGEST, other.run.data.tags[DIGEST])
+        self._discard(self.work / f"{key}.checkpoint")  # of a run that stopped here
         logger.info("%s: taken over from run %s", stage.name, other.run.info.run_id[:8])
         return self._artefacts(self.client.get_run(run_id))
 
