@@ -91,7 +91,7 @@ EXPERIMENTS = (
     Experiment("fig_5_13"),
     Experiment("table_6_2", small=(*SMALL_STUDY, "study.datasets=[lasa/angle]")),
     Experiment("table_6_3", small=("training.steps=5", "study.datasets=[lasa/angle]")),
-    Experiment("fig_6_5", ("safety.*",), (*SMALL_FIELD, "safety.starts=50")),
+    Experiment("fig_6_5", ("safety.*",), (*SMALL_FIELD, "safety.starts=50", "safety.points_per_axis=120")),
     Experiment("fig_6_6", small=(*SMALL_STUDY, "study.datasets=[lasa/angle]")),
     Experiment("fig_6_8", small=(*SMALL_STUDY, "study.datasets=[lasa/angle]")),
     Experiment("fig_6_9", small=(*SMALL_STUDY, "study.datasets=[lasa/angle]")),
