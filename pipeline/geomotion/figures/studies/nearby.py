@@ -35,7 +35,7 @@ def nearby(cells: Sequence[JudgedCell]) -> StudyFigure | None:
                 for ax, distance in zip(row, (data.euclidean, data.claimed), strict=True):
                     _draw(ax, data, distance, cell.variant, colour)
         for ax, title in zip(row, TITLES, strict=True):
-            ax.set_title(f"{dataset}: {title}")
+            ax.set_title(f"{dataset}\n{title}")
         row[0].set_ylabel("distance / initial distance [1]")
     for ax in grid[-1]:
         ax.set_xlabel("share of the duration [1]")
