@@ -15,7 +15,7 @@ def test_every_variant_has_a_curve_that_begins_at_one(planar_arrays, tmp_path):
             np.savez(folder / "evaluation.npz", **planar_arrays)
             cells += [JudgedCell(dataset, variant, seed, folder) for seed in (0, 1)]
     drawn = nearby(cells)
-    assert [ax.get_title().split(":")[0] for ax in drawn.figure.axes] == ["a", "a", "b", "b"]
+    assert [ax.get_title().split("\n")[0] for ax in drawn.figure.axes] == ["a", "a", "b", "b"]
     for ax in drawn.figure.axes:
         curves = [line for line in ax.get_lines() if len(line.get_xdata()) > 2]
         assert [line.get_label() for line in curves] == ["ours", "theirs"]
