@@ -63,13 +63,14 @@ class Policy(nn.Module):
         given = dict(zip((one.name for one in self.inputs), inputs, strict=True))
         x, is_rotation = self._state(given)
         conditions = [given[ports.CONDITION]] if self.conditional is not None else []
-        z, velocity = self._velocity(x, given)
+        stretch, slowdown = self._units(given)
+        z, velocity = self._velocity(x, given, stretch, slowdown)
         velocities = self._around_obstacle(x, velocity, given)
         is_defined = torch.cat(velocities, -1).isfinite().all(-1) & is_rotation
         is_inside = self.training_range.contains(x, conditions)
         status = torch.where(is_defined, torch.where(is_inside, Status.ok, Status.outside), Status.undefined)
         trusted = tuple(torch.where(is_defined[..., None], one, 0) for one in velocities)
-        offset = self._offset(x, z, given)
+        offset = self._offset(x, z, stretch)
         return (*trusted, status) if offset is None else (*trusted, status, offset.norm(dim=-1))
 
     def _state(self, given: Mapping[str, Tensor]) -> tuple[State, Bool[Tensor, "*batch"]]:
@@ -83,13 +84,19 @@ class Policy(nn.Module):
             x = torch.cat([given[ports.JOINTS], x], dim=-1)
         return x, ((length - 1).abs() < ROTATION_TOLERANCE)[..., 0]
 
-    def _velocity(self, x: State, given: Mapping[str, Tensor]) -> tuple[Tensor, Velocity]:
+    def _units(self, given: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
+        """How much larger and slower the skill is under its condition."""
+        if self.conditional is None:
+            return torch.ones(()), torch.ones(())
+        return self.conditional.units(given[ports.CONDITION])
+
+    def _velocity(
+        self, x: State, given: Mapping[str, Tensor], stretch: Tensor, slowdown: Tensor
+    ) -> tuple[Tensor, Velocity]:
         """Latent state, with the code of a condition behind it, and ẋ."""
-        field = self.field
-        augmented, stretch, slowdown = x, torch.ones(()), torch.ones(())
+        field, augmented = self.field, x
         if self.conditional is not None:
             augmented = self.conditional.augmented(x, given[ports.CONDITION])
-            stretch, slowdown = self.conditional.units(given[ports.CONDITION])
         z, push_forward = field.chart.linearise(augmented)
         latent = self._latent_velocity(z, given)
         if ports.ELAPSED in given:
@@ -106,11 +113,10 @@ class Policy(nn.Module):
         parts = [self.embedded.field(along), -given[ports.TRANSVERSE_RATE] * across]
         return torch.cat([*parts, torch.zeros_like(z[..., self.embedded.dim :])], -1)
 
-    def _offset(self, x: State, z: Tensor, given: Mapping[str, Tensor]) -> Tensor | None:
+    def _offset(self, x: State, z: Tensor, stretch: Tensor) -> Tensor | None:
         """z_e in the size of the demonstrations [m]; None for skills of all dimensions."""
         if self.embedded is not None:
-            own = self.scale_m * z[..., self.embedded.skill_dim : self.embedded.dim]
-            return own if self.conditional is None else own * self.conditional.units(given[ports.CONDITION])[0]
+            return self.scale_m * stretch * z[..., self.embedded.skill_dim : self.embedded.dim]
         if self.decoder is not None:
             return self.decoder.scaling.scale * self.decoder.split(x)[1]
         return None
