@@ -139,7 +139,7 @@ class Tracker:
     def _execute(
         self, stage: Stage, config: object, inputs: Mapping[str, Artefacts], parent: CommandRun, key: str
     ) -> Artefacts:
-        checkpoint = self.work / f"{key}.checkpoint"
+        checkpoint = self._checkpoint(key)
         if not self.reuse:
             self._discard(checkpoint)
         run_id = self._stopped(key) if any(self._kept(checkpoint)) else None
@@ -184,9 +184,12 @@ class Tracker:
             self.client.log_artifacts(run_id, str(other.folder))
             self.client.set_tag(run_id, MERGED, other.run.info.run_id)
             self.client.set_tag(run_id, DIGEST, other.run.data.tags[DIGEST])
-        self._discard(self.work / f"{key}.checkpoint")  # of a run that stopped here
+        self._discard(self._checkpoint(key))  # of a run that stopped here
         logger.info("%s: taken over from run %s", stage.name, other.run.info.run_id[:8])
         return self._artefacts(self.client.get_run(run_id))
+
+    def _checkpoint(self, key: str) -> Path:
+        return self.work / f"{key}.checkpoint"
 
     def _kept(self, checkpoint: Path) -> list[Path]:
         """A checkpoint and those beside it of a training in several phases."""
