@@ -5,7 +5,7 @@ thesis-small``. Each experiment is the command above its table, its output read 
 reused, so that what was stopped goes on where it was. Its table replaces what stands between ``<!-- thesis/NAME -->``
 and ``<!-- end -->`` in the file; the text around is written by people. Human motion is not fetched by itself and has to
 be named by ``--mmm``, or its experiments are left out, and listed; RoboTasks9 is, where ``--robotasks9`` names no copy.
-Exits with 1 if one failed. Fig. 6.16, of two policies, has no table here.
+Exits with 1 if one failed.
 """
 
 import argparse
@@ -24,14 +24,18 @@ from pathlib import Path
 from typing import Any
 
 from geomotion.files import write_text
+from geomotion.stages.episodes import EPISODE_COLUMNS, episode_rows
 from geomotion.stages.study_table import markdown_table
 from geomotion.tables import markdown, number
 
-ROBOTASKS9, MMM = "robotasks9", "mmm"  # recordings that can be named, the second has to be
-LEFT_OUT = f"left out: name its recordings with --{MMM}"
+LEFT_OUT = "left out: name its recordings with --mmm"
 NO_MOTION = 3  # exit status of a plan or replay that found no way, which some figures are about
 SMALL_FIELD = ("training.steps=20", "evaluation.contraction_grid_points=5", "evaluation.region_starts=4")
 SMALL_STUDY = (*SMALL_FIELD, "study.seeds=[0]")
+SMALL_PICTURES = (
+    "dataset.demos=1", "dataset.points=60", "dataset.snapshots=4", "training.steps=20", "episodes.per_place=1",
+    "episodes.between=0",
+)  # fmt: skip
 SMALL_MANIFOLD = (
     "training.steps=300", "training.spread_steps=60", "training.restarts=0", "training.batch_points=256",
     "graph.points_per_axis=60", "manifold.points=60", "manifold.kernels=100",
@@ -47,18 +51,18 @@ class Experiment:
         scores: Patterns of the scores to show; a study has columns of its own.
         small: Settings of the toy size.
         program: Which one runs it.
-        recordings: What is named on the command line, if anything.
+        human_motion: Whether it needs ``--mmm``.
     """
 
     name: str
     scores: tuple[str, ...] = ()
     small: tuple[str, ...] = SMALL_STUDY
     program: str = "ncds"
-    recordings: str | None = None
+    human_motion: bool = False
 
 
-def _gms(name: str, *scores: str, small: tuple[str, ...] = (), recordings: str | None = None) -> Experiment:
-    return Experiment(name, scores, (*SMALL_MANIFOLD, *small), "gms", recordings)
+def _gms(name: str, *scores: str, small: tuple[str, ...] = ()) -> Experiment:
+    return Experiment(name, scores, (*SMALL_MANIFOLD, *small), "gms")
 
 
 FIT = ("train.dtwd_per_point", "heldout.dtwd_per_point", "contraction.*.non_contracting_fraction")
@@ -66,8 +70,8 @@ PLANNED = ("heldout.*dtwd*", "heldout.planned_share", "pairs.planned_share")
 EXPERIMENTS = (
     _gms("fig_3_1", *PLANNED, small=("dataset.demos=6",)),
     _gms("fig_3_3", "methods.*", *PLANNED, small=("dataset.demos=6",)),
-    _gms("fig_3_6", *PLANNED, "energy.*", recordings=ROBOTASKS9),
-    _gms("fig_3_7", *PLANNED, "energy.*", recordings=ROBOTASKS9),
+    _gms("fig_3_6", *PLANNED, "energy.*"),
+    _gms("fig_3_7", *PLANNED, "energy.*"),
     _gms("fig_3_8", *PLANNED, small=("dataset.demos=12", "dataset.points=60")),
     _gms("fig_3_9", *PLANNED, small=("dataset.demos=12", "dataset.points=60")),
     _gms("fig_4_1", *PLANNED),
@@ -94,10 +98,10 @@ EXPERIMENTS = (
     Experiment("fig_6_5", ("safety.*",), (*SMALL_FIELD, "safety.starts=50", "safety.points_per_axis=120")),
     Experiment("fig_6_6", small=(*SMALL_STUDY, "study.datasets=[lasa/angle]")),
     Experiment("fig_6_8", small=(*SMALL_STUDY, "study.datasets=[lasa/angle]")),
-    Experiment("fig_6_9", small=(*SMALL_STUDY, "study.datasets=[lasa/angle]")),
-    Experiment("fig_6_14", ("train.joint_rmse*", "returns.*"), SMALL_FIELD, recordings=MMM),
-    Experiment("fig_6_15", ("train.joint_rmse*", "returns.*"), SMALL_FIELD, recordings=MMM),
-    Experiment("fig_6_17", ("safety.*",), (*SMALL_FIELD, "safety.starts=50"), recordings=ROBOTASKS9),
+    Experiment("fig_6_14", ("train.joint_rmse*", "returns.*"), SMALL_FIELD, human_motion=True),
+    Experiment("fig_6_15", ("train.joint_rmse*", "returns.*"), SMALL_FIELD, human_motion=True),
+    Experiment("fig_6_16", small=SMALL_PICTURES),
+    Experiment("fig_6_17", ("safety.*",), (*SMALL_FIELD, "safety.starts=50")),
 )
 
 
@@ -117,8 +121,8 @@ def main() -> int:
     parser.add_argument("--results", type=Path, help="file whose tables are replaced; without it they are printed")
     parser.add_argument("--jobs", type=int, default=1, help="experiments at once")
     parser.add_argument("--root", default="runs", help="results folder")
-    parser.add_argument(f"--{ROBOTASKS9}", help="folder of these recordings, instead of fetching them")
-    parser.add_argument(f"--{MMM}", help="file of a human motion in MMM XML")
+    parser.add_argument("--robotasks9", help="folder of these recordings, instead of fetching them")
+    parser.add_argument("--mmm", help="file of a human motion in MMM XML")
     parser.add_argument("overrides", nargs="*", help="further settings for every experiment")
     asked = parser.parse_args()
     if unknown := set(asked.only or ()) - {one.name for one in EXPERIMENTS}:
@@ -148,14 +152,13 @@ def run(experiment: Experiment, asked: argparse.Namespace) -> Outcome:
     """Carry out the command of an experiment and read what it says."""
     typed = [f"experiment=thesis/{experiment.name}", *(experiment.small if asked.small else ()), *asked.overrides]
     hidden = [f"tracking.root={asked.root}", "output=json"]
-    if experiment.recordings is not None:
-        place = getattr(asked, experiment.recordings)
-        if place is None and experiment.recordings == MMM:
+    if experiment.human_motion:
+        if asked.mmm is None:
             return Outcome(None, LEFT_OUT)
-        if place is not None:
-            hidden.append(f"dataset.path={place}" if experiment.recordings == MMM else f"dataset.root={place}")
+        hidden.append(f"dataset.path={asked.mmm}")
+    named = {} if asked.robotasks9 is None else {"ROBOTASKS9_DATA_DIR": asked.robotasks9}
     command = [sys.executable, "-m", "geomotion_cli", experiment.program, "run", *typed, *hidden]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, **named})
     assert process.stdout is not None
     said = process.stdout.read()
     _, status, used = os.wait4(process.pid, 0)
@@ -171,9 +174,12 @@ def run(experiment: Experiment, asked: argparse.Namespace) -> Outcome:
 
 
 def tables(document: dict[str, Any], patterns: Sequence[str]) -> Iterator[str]:
-    """Markdown of a study, or of the wanted scores of one run."""
+    """Markdown of a study, of episodes in closed loop, or of the wanted scores of one run."""
     if "study" in document:
         yield markdown_table(document["study"]).strip()
+        return
+    if "episodes" in document:
+        yield markdown([EPISODE_COLUMNS, *episode_rows(document["episodes"])])
         return
     rows = [("score", "value", "unit", "of")]
     for name, score in document["scores"]["scores"].items():

@@ -13,7 +13,7 @@ from geomotion.config import CommandConfig, GmsConfig, NcdsConfig
 
 CONFIG_TYPES: dict[str, type[CommandConfig]] = {"gms": GmsConfig, "ncds": NcdsConfig}
 _GMS_GROUPS = {"dataset", "obstacle", "experiment", "space"}  # its other settings have one form each
-_GMS_EXPERIMENT = re.compile(r"thesis/(gms|fig_[34]_.*)|regression/gms_.*")  # chapters 3 and 4 of the thesis
+_GMS_EXPERIMENT = re.compile(r"thesis/(gms|fig_[34]_.*)|regression/gms_.*|.*_geodesics")  # chapters 3, 4 of the thesis
 _OF_GMS = {"experiment": _GMS_EXPERIMENT, "space": re.compile("joint|pose")}  # the other program has the rest
 _OF_BOTH = {"demonstrated"}
 _OF_NCDS = {"dataset": {"mmm", "panda/grasp_and_drop"}}  # people are no arms, and geodesics do not look

@@ -257,7 +257,7 @@ class RoboTasks9Dataset(DatasetConfig):
     """Franka end-effector poses, kinesthetic teaching, nine demonstrations a task."""
 
     task: str = MISSING  # any file of the set with dataset.root; those with a checksum can be downloaded
-    root: str | None = None  # folder of the .npy files; null: downloaded once and checked
+    root: str | None = None  # folder of the .npy files; null: $ROBOTASKS9_DATA_DIR, or downloaded once and checked
     sampling_rate_hz: float = 60.0  # nominal rate of the source's own loader
 
     def __post_init__(self) -> None:

@@ -113,3 +113,14 @@ def test_other_files_of_the_set_are_read_from_a_folder(robotasks9_folder, tmp_pa
     (tmp_path / "navigation.npy").write_bytes((robotasks9_folder / "scoop.npy").read_bytes())
     config = RoboTasks9Dataset(name="robotasks9/other", task="navigation", root=str(tmp_path))
     assert read(config).name == "robotasks9/navigation"
+
+
+def test_an_environment_variable_names_a_folder_for_all_datasets_of_the_set(robotasks9_folder, monkeypatch):
+    monkeypatch.setenv(robotasks9.FOLDER_VARIABLE, str(robotasks9_folder))
+    assert len(read(config())) == 9
+
+
+def test_what_the_named_folder_lacks_is_said(monkeypatch, tmp_path):
+    monkeypatch.setenv(robotasks9.FOLDER_VARIABLE, str(tmp_path))
+    with pytest.raises(MissingData, match="ROBOTASKS9_DATA_DIR"):
+        read(config())

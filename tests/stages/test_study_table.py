@@ -42,7 +42,7 @@ def test_a_row_for_each_variant_with_the_numbers_of_others_beside_it():
 def test_several_seeds_are_averaged_and_their_spread_is_shown():
     found = {("letters/j", "plain"): [scores(1.0), scores(3.0)], ("letters/j", "ours"): [scores(1.0), scores(None)]}
     _, plain, ours = lines(table_document(study(seeds=[0, 1], reference=None), found, []))
-    assert plain[2:] == ["2 ± 1 [1, 3]", "–"]
+    assert plain[2:] == ["2 ± 1.41 [1, 3]", "–"]
     assert ours[2:] == ["not finite", "–"]
 
 
@@ -105,3 +105,17 @@ def test_a_study_needs_one_or_more_of_everything_once(changes):
 def test_what_a_study_varies_cannot_be_set_beside_it(typed):
     with pytest.raises(InvalidSetting, match=typed.split("=")[0]):
         compose_cells("ncds", study(), [typed])
+
+
+def test_a_column_of_several_units_says_which_is_whose():
+    joints = {name: one | {"unit": "rad"} for name, one in scores(2.0).items()}
+    found = {("letters/j", "plain"): [scores(1.0)], ("arm", "plain"): [joints]}
+    document = table_document(study(datasets=["letters/j", "arm"], variants=[StudyVariant("plain")]), found, [])
+    assert "DTW: train.dtw [mm: letters/j; rad: arm]" in aligned_table(document)
+
+
+def test_the_legend_does_not_promise_seeds_that_failed():
+    found = {("letters/j", "plain"): [scores(1.0)]}
+    assert "over 2 seeds [" in aligned_table(table_document(study(seeds=[0, 1]), found, []))
+    failed = table_document(study(seeds=[0, 1]), found, ["ours, letters/j, seed 1: no"])
+    assert "over 2 seeds, or those of them that did not fail" in aligned_table(failed)

@@ -32,6 +32,7 @@ GROUPS = {
     "between": "at unseen places between them",
     "moved": "moved to another place before the grasp",
 }
+EPISODE_COLUMNS = ("episodes", "succeeded", "share", "failures")
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ def episodes(config: EpisodesStageConfig, inputs: Mapping[str, Artefacts], run: 
 
 def episodes_table(document: Mapping[str, Any]) -> str:
     """What came of the episodes, in lines for people."""
-    return aligned([("episodes", "succeeded", "share", "failures"), *episode_rows(document)])
+    return aligned([EPISODE_COLUMNS, *episode_rows(document)])
 
 
 def episode_rows(document: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:

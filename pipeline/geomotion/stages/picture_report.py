@@ -9,7 +9,7 @@ from geomotion.figures.report.page import Column, Data, Listing, Page, render
 from geomotion.figures.report.pictured import CAPTIONS, FILM, caveats, confusion_listing, headlines, verdict
 from geomotion.figures.report.pictures import film, pictures
 from geomotion.files import read_json, write_text
-from geomotion.stages.episodes import episode_rows
+from geomotion.stages.episodes import EPISODE_COLUMNS, episode_rows
 from geomotion.stages.report import ReportConfig, origin, training_facts
 from geomotion.tracking import Artefacts, StageRun
 
@@ -69,10 +69,8 @@ def _facts(acted: Mapping[str, Any], taken: Mapping[str, Any], inputs: Mapping[s
 
 
 def _episodes(acted: Mapping[str, Any]) -> Listing:
-    names = ("episodes", "succeeded", "share", "failures")
-    return Listing(
-        "Episodes in closed loop", tuple(Column(name, is_text=True) for name in names), tuple(episode_rows(acted))
-    )
+    columns = tuple(Column(name, is_text=True) for name in EPISODE_COLUMNS)
+    return Listing("Episodes in closed loop", columns, tuple(episode_rows(acted)))
 
 
 def _conditions(skill: str, inputs: Mapping[str, Artefacts]) -> Listing:

@@ -1,7 +1,7 @@
 """The table of a study: scores of its cells, averaged over seeds, beside the numbers of others."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from statistics import fmean, pstdev
+from statistics import fmean, stdev
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ def table_document(study: StudyConfig, scores: Mapping[Key, Sequence[Document]],
         "title": study.title,
         "seeds": list(study.seeds),
         "columns": [
-            {"score": column.score, "title": column.title, "unit": _unit(column.score, scores)}
+            {"score": column.score, "title": column.title, "units": _units(column.score, scores)}
             for column in study.columns
         ],
         "reference_source": study.reference.source if study.reference else None,
@@ -77,14 +77,12 @@ def lines(document: Document) -> Iterator[list[str]]:
 
 def legend(document: Document) -> list[str]:
     """What each column is."""
-    found = []
-    for one in document["columns"]:
-        unit = f" [{one['unit']}]" if one["unit"] not in (None, "1") else ""
-        found.append(f"{one['title']}: {one['score']}{unit}")
+    found = [f"{one['title']}: {one['score']}{_in_brackets(one['units'])}" for one in document["columns"]]
     if len(document["seeds"]) > 1:
+        fewer = ", or those of them that did not fail" if document["failures"] else ""
         found.append(
-            f"mean ± standard deviation over {len(document['seeds'])} seeds [{CONFIDENCE:.0%} bootstrap interval of "
-            "the mean, over seeds and what they judged]"
+            f"mean ± standard deviation over {len(document['seeds'])} seeds{fewer} [{CONFIDENCE:.0%} bootstrap "
+            "interval of the mean, over seeds and what they judged]"
         )
     return found
 
@@ -103,7 +101,8 @@ def _over_seeds(scores: Sequence[Document | None]) -> dict[str, Any] | None:
     values = [score["value"] for score in known]
     if any(value is None for value in values):
         return {"mean": None, "spread": None, "interval": None, "values": values}
-    return {"mean": fmean(values), "spread": pstdev(values), "interval": bootstrap_interval(known), "values": values}
+    spread = stdev(values) if len(values) > 1 else None
+    return {"mean": fmean(values), "spread": spread, "interval": bootstrap_interval(known), "values": values}
 
 
 def bootstrap_interval(scores: Sequence[Document]) -> list[float] | None:
@@ -137,5 +136,15 @@ def _cell(value: Document | None) -> str:
     return number(value["mean"], value["spread"]) + interval
 
 
-def _unit(name: str, scores: Mapping[Key, Sequence[Document]]) -> str | None:
-    return next((one[name]["unit"] for cells in scores.values() for one in cells if name in one), None)
+def _units(name: str, scores: Mapping[Key, Sequence[Document]]) -> dict[str, str]:
+    """Unit of a score by dataset."""
+    return {dataset: one[name]["unit"] for (dataset, _), cells in scores.items() for one in cells if name in one}
+
+
+def _in_brackets(units: Mapping[str, str]) -> str:
+    """The unit, or what it is on which datasets."""
+    different = sorted(set(units.values()))
+    if len(different) > 1:
+        of = {unit: ", ".join(dataset for dataset, own in units.items() if own == unit) for unit in different}
+        return f" [{'; '.join(f'{unit}: {datasets}' for unit, datasets in of.items())}]"
+    return f" [{different[0]}]" if different and different[0] != "1" else ""

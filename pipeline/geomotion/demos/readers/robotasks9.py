@@ -1,6 +1,7 @@
 """RoboTasks9: end-effector poses of a Franka Panda, taught by hand, nine demonstrations a task."""
 
 import logging
+import os
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from geomotion.demos.demonstrations import Array, Demonstrations, Trajectory, va
 from geomotion.errors import DatasetError, MissingData
 
 METRES_PER_UNIT = 1e-2  # the source states no unit; centimetres put every pose within the Panda's reach
+FOLDER_VARIABLE = "ROBOTASKS9_DATA_DIR"
 COMMIT = "cf610acbaa8264d9d39df44439d8d7377e689009"
 FOLDER_URL = f"https://raw.githubusercontent.com/sayantanauddy/clfd-snode/{COMMIT}/datasets/robottasks/pos_ori"
 SHA256 = {
@@ -64,16 +66,17 @@ def _load(path: Path) -> Array:
 
 
 def _find(config: RoboTasks9Dataset) -> Path:
-    if config.root is None:
+    root = config.root or os.environ.get(FOLDER_VARIABLE)
+    if root is None:
         return _download(config.task)
-    path = Path(config.root).expanduser() / f"{config.task}.npy"
+    path = Path(root).expanduser() / f"{config.task}.npy"
     if not path.is_file():
         raise MissingData(f"{path} (RoboTasks9)", _how_to_get(config.task))
     return path
 
 
 def _how_to_get(task: str) -> str:
-    return f"Get {FOLDER_URL}/{task}.npy and set dataset.root= to its folder."
+    return f"Get {FOLDER_URL}/{task}.npy and set dataset.root= or {FOLDER_VARIABLE} to its folder."
 
 
 def _download(task: str) -> Path:

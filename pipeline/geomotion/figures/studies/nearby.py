@@ -1,6 +1,7 @@
 """How the distance between nearby rollouts evolves with each method (Fig. 6.6)."""
 
 from collections.abc import Sequence
+from itertools import chain
 
 from matplotlib.axes import Axes
 
@@ -39,7 +40,8 @@ def nearby(cells: Sequence[JudgedCell]) -> StudyFigure | None:
         row[0].set_ylabel("distance / initial distance [1]")
     for ax in grid[-1]:
         ax.set_xlabel("share of the duration [1]")
-    grid[0, -1].legend(loc="upper left", bbox_to_anchor=(1.02, 1.0))
+    lines = {str(line.get_label()): line for line in chain.from_iterable(ax.lines for ax in grid[:, 0])}
+    grid[0, -1].legend(handles=[lines[name] for name in variants], loc="upper left", bbox_to_anchor=(1.02, 1.0))
     arrays = [{"time_s": data.time_s, "euclidean": data.euclidean, "claimed": data.claimed} for _, data in found]
     caption = (
         "Mean distance between all pairs of rollouts from nearby starts, first seed. A contracting field lowers it at "
