@@ -64,15 +64,23 @@ regress: $(STAMP)  ## small pinned experiments against their stored scores; JUni
 		$(BIN)/$$program check experiment=regression/$$name check.junit=runs/regression/$$name.xml \
 			$(if $(UPDATE),check.update=$(UPDATE)) || failed=1; done; exit $$failed
 
-thesis: $(STAMP)  ## every experiment of the thesis at full size (hours) into docs/results.md; ONLY="table_5_1 …", ROBOTASKS9=folder, MMM=file
+thesis: $(STAMP)  ## every experiment of the thesis at full size (hours) into docs/results.md; ONLY="table_5_1 …", MMM=file
 	$(BIN)/python benchmarks/thesis.py --results docs/results.md $(CHOSEN)
 
 thesis-small: $(STAMP)  ## the same at toy size (minutes): that everything runs; tables are printed
 	$(BIN)/python benchmarks/thesis.py --small --jobs 2 --root runs/thesis-small $(CHOSEN)
 
-ROBOTASKS9 ?= $(wildcard ../shared/data/robotasks9-franka)
+# recordings that are here already need not be fetched
+ROBOTASKS9 := $(abspath $(wildcard ../shared/data/robotasks9-franka))
+ifneq ($(ROBOTASKS9),)
+thesis thesis-small: export ROBOTASKS9_DATA_DIR ?= $(ROBOTASKS9)
+endif
+COMANIPULATION := $(abspath $(wildcard ../shared/data/panda-comanipulation-17))
+ifneq ($(COMANIPULATION),)
+thesis thesis-small: export COMANIPULATION_DATA_DIR ?= $(COMANIPULATION)
+endif
 MMM ?= $(wildcard ../shared/data-evaluation-only/kit-mmm/00001_mmm.xml)
-CHOSEN = $(if $(ONLY),--only $(ONLY)) $(if $(ROBOTASKS9),--robotasks9 $(ROBOTASKS9)) $(if $(MMM),--mmm $(MMM))
+CHOSEN = $(if $(ONLY),--only $(ONLY)) $(if $(MMM),--mmm $(MMM))
 
 ui: $(STAMP)  ## MLflow pages of runs/
 	$(BIN)/ncds ui

@@ -4,7 +4,7 @@ Run as ``python benchmarks/thesis.py [--small] [--only NAME …] [--results FILE
 thesis-small``. Each experiment is the command above its table, its output read by a program: finished stages are
 reused, so that what was stopped goes on where it was. Its table replaces what stands between ``<!-- thesis/NAME -->``
 and ``<!-- end -->`` in the file; the text around is written by people. Human motion is not fetched by itself and has to
-be named by ``--mmm``, or its experiments are left out, and listed; RoboTasks9 is, where ``--robotasks9`` names no copy.
+be named by ``--mmm``, or its experiments are left out, and listed.
 Exits with 1 if one failed.
 """
 
@@ -25,6 +25,9 @@ from typing import Any
 
 from geomotion.files import write_text
 from geomotion.stages.episodes import EPISODE_COLUMNS, episode_rows
+from geomotion.stages.plan import plan_table
+from geomotion.stages.policy_replay import policy_replay_table
+from geomotion.stages.replay import replay_table
 from geomotion.stages.study_table import markdown_table
 from geomotion.tables import markdown, number
 
@@ -66,6 +69,9 @@ def _gms(name: str, *scores: str, small: tuple[str, ...] = ()) -> Experiment:
 
 
 FIT = ("train.dtwd_per_point", "heldout.dtwd_per_point", "contraction.*.non_contracting_fraction")
+FOLLOWED = (
+    "train.dtwd_per_point", "train.*ion_dtwd", "heldout.dtwd_per_point", "heldout.*ion_dtwd", "pushes.*", "obstacles.*",
+)  # fmt: skip
 PLANNED = ("heldout.*dtwd*", "heldout.planned_share", "pairs.planned_share")
 EXPERIMENTS = (
     _gms("fig_3_1", *PLANNED, small=("dataset.demos=6",)),
@@ -98,6 +104,9 @@ EXPERIMENTS = (
     Experiment("fig_6_5", ("safety.*",), (*SMALL_FIELD, "safety.starts=50", "safety.points_per_axis=120")),
     Experiment("fig_6_6", small=(*SMALL_STUDY, "study.datasets=[lasa/angle]")),
     Experiment("fig_6_8", small=(*SMALL_STUDY, "study.datasets=[lasa/angle]")),
+    Experiment("fig_6_13a", FOLLOWED, SMALL_FIELD),
+    Experiment("fig_6_13b", FOLLOWED, SMALL_FIELD),
+    Experiment("fig_6_13c", FOLLOWED, SMALL_FIELD),
     Experiment("fig_6_14", ("train.joint_rmse*", "returns.*"), SMALL_FIELD, human_motion=True),
     Experiment("fig_6_15", ("train.joint_rmse*", "returns.*"), SMALL_FIELD, human_motion=True),
     Experiment("fig_6_16", small=SMALL_PICTURES),
@@ -121,7 +130,6 @@ def main() -> int:
     parser.add_argument("--results", type=Path, help="file whose tables are replaced; without it they are printed")
     parser.add_argument("--jobs", type=int, default=1, help="experiments at once")
     parser.add_argument("--root", default="runs", help="results folder")
-    parser.add_argument("--robotasks9", help="folder of these recordings, instead of fetching them")
     parser.add_argument("--mmm", help="file of a human motion in MMM XML")
     parser.add_argument("overrides", nargs="*", help="further settings for every experiment")
     asked = parser.parse_args()
@@ -156,9 +164,8 @@ def run(experiment: Experiment, asked: argparse.Namespace) -> Outcome:
         if asked.mmm is None:
             return Outcome(None, LEFT_OUT)
         hidden.append(f"dataset.path={asked.mmm}")
-    named = {} if asked.robotasks9 is None else {"ROBOTASKS9_DATA_DIR": asked.robotasks9}
     command = [sys.executable, "-m", "geomotion_cli", experiment.program, "run", *typed, *hidden]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, **named})
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     said = process.stdout.read()
     _, status, used = os.wait4(process.pid, 0)
@@ -182,16 +189,26 @@ def tables(document: dict[str, Any], patterns: Sequence[str]) -> Iterator[str]:
         yield markdown([EPISODE_COLUMNS, *episode_rows(document["episodes"])])
         return
     rows = [("score", "value", "unit", "of")]
-    for name, score in document["scores"]["scores"].items():
+    for name, score in document.get("scores", {"scores": {}})["scores"].items():
         if any(fnmatch(name, pattern) for pattern in patterns):
             value = number(score["value"], score["spread"] if score["statistic"] == "mean" else None)
             rows.append((name, value, "" if score["unit"] == "1" else score["unit"], f"{score['count']}"))
-    yield markdown(rows)
+    if len(rows) > 1:
+        yield markdown(rows)
     if "certificate" in document:
         certificate = document["certificate"]
         rate = certificate["rate_per_s"]
         proven = "" if rate is None else f", at {rate:.3g} 1/s"
         yield f"\nContraction: {certificate['claim'].replace('_', ' ')}{proven}."
+    if "plan" in document:
+        yield _as_printed(plan_table(document["plan"]))
+    if "replay" in document:
+        told = replay_table if "plan" in document else policy_replay_table
+        yield _as_printed(told(document["replay"]))
+
+
+def _as_printed(lines: str) -> str:
+    return f"\n```\n{lines}\n```"
 
 
 def with_table(text: str, name: str, table: str) -> str:

@@ -47,6 +47,12 @@ def robotasks9_folder() -> Path:
 
 
 @pytest.fixture(scope="session")
+def comanipulation_folder() -> Path:
+    """Folder with symbol_data.mat of the Panda Co-Manipulation Dataset."""
+    return _folder(SHARED / "data/panda-comanipulation-17", "Panda Co-Manipulation Dataset")
+
+
+@pytest.fixture(scope="session")
 def mmm_folder() -> Path:
     """Folder with a recording of a person in MMM XML, and the model."""
     return _folder(SHARED / "data-evaluation-only/kit-mmm", "A recording in MMM XML")

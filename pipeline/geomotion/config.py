@@ -268,6 +268,25 @@ class RoboTasks9Dataset(DatasetConfig):
 
 
 @dataclass
+class CoManipulationDataset(DatasetConfig):
+    """Symbols drawn on a table with a hand-guided Panda; the hand's orientation is derived: it faces where it goes."""
+
+    symbol: int = MISSING  # any of the set with dataset.root; 17, which has a checksum, can be downloaded
+    root: str | None = None  # folder of symbol_data.mat; null: $COMANIPULATION_DATA_DIR, or downloaded once and checked
+    sampling_rate_hz: float = 1000.0  # of the source's own example
+    rest_speed_m_per_s: float = 0.005  # slower is a rest, which is cut out; 0: nothing is
+    points: int = 300  # of each recording, even in time
+
+    def __post_init__(self) -> None:
+        self.name = f"comanipulation/{self.symbol}"
+        if self.root is None:
+            _require(self.symbol == 17, "dataset.symbol", self.symbol, "17, or a folder of another one: dataset.root=…")
+        _require_positive("dataset", self, "sampling_rate_hz")
+        _require(self.rest_speed_m_per_s >= 0, "dataset.rest_speed_m_per_s", self.rest_speed_m_per_s, "0 or more")
+        _require(self.points >= 10, "dataset.points", self.points, "10 or more")
+
+
+@dataclass
 class FolderDataset(DatasetConfig):
     """A user's own recordings: a folder of CSV, NPZ or parquet files, or a dataset written by `ingest`."""
 
@@ -358,6 +377,13 @@ class StraightLinesDataset(GeneratedDataset):
 @dataclass
 class PandaReachDataset(GeneratedDataset):
     """Poses of the simulated Panda that reaches for three places in turn, to grasp from the side, Sec. 3.6.1."""
+
+
+@dataclass
+class PandaSinusoidDataset(GeneratedDataset):
+    """A wave drawn on a table by the simulated Panda, the hand pointing down, Sec. 6.4.5, Fig. 6.13."""
+
+    duration_s: float = 6.0
 
 
 @dataclass
@@ -642,6 +668,7 @@ class ExactField(FieldConfig):
     transverse_rate_per_duration: float = 16.0  # k, at which the remaining coordinates decay
     transverse_start: float = 0.05  # share of k at the start of a motion, where there is a time law
     transverse_rise: float = 0.4  # share of the duration over which all of k comes in
+    start_fade_durations: float | None = None  # until nothing is left of where a motion began; null: not remembered
 
 
 @dataclass
@@ -2033,6 +2060,7 @@ def _dataset_choices() -> dict[str, dict[str, Any]]:
         "panda": {
             "reach_to_grasp": {"defaults": ["panda_reach_schema", "_self_"]},
             "pouring_3x3": {"defaults": ["panda_pouring_schema", "_self_"]},
+            "sinusoid": {"defaults": ["panda_sinusoid_schema", "_self_"]},
             "reach_to_grasp_joint": {"defaults": ["panda_reach_joint_schema", "_self_"]},
             "reach_to_grasp_overlap": {
                 "defaults": ["panda_reach_joint_schema", "_self_"],
@@ -2041,6 +2069,7 @@ def _dataset_choices() -> dict[str, dict[str, Any]]:
             "pouring_joint": {"defaults": ["panda_pouring_joint_schema", "_self_"]},
             "circle_joint": {"defaults": ["panda_circle_joint_schema", "_self_"]},
         },
+        "comanipulation": {"17": {"symbol": 17}, "other": {}},
         "planar": {"s_curve": {"defaults": ["planar_s_curve_schema", "_self_"]}},
     }
 
@@ -2129,6 +2158,8 @@ def register() -> None:
             "straight_lines_schema": StraightLinesDataset,
             "panda_reach_schema": PandaReachDataset,
             "panda_pouring_schema": PandaPouringDataset,
+            "panda_sinusoid_schema": PandaSinusoidDataset,
+            "comanipulation_schema": CoManipulationDataset,
             "panda_reach_joint_schema": PandaReachJointDataset,
             "panda_pouring_joint_schema": PandaPouringJointDataset,
             "panda_circle_joint_schema": PandaCircleJointDataset,

@@ -25,6 +25,7 @@ NEEDED = {  # what has no default
     "experiment=thesis/fig_6_15": ["dataset.path=walk.xml"],
     "dataset=robotasks9/other": ["dataset.task=navigation", "dataset.root=recordings"],
     "dataset=robotasks9_joint/other": ["dataset.task=navigation", "dataset.root=recordings"],
+    "dataset=comanipulation/other": ["dataset.symbol=3", "dataset.root=recordings"],
     "field=custom": ["field.target=torch.nn.Linear"],
     "obstacle=sphere": ["obstacle.centre_m=[0,0]", "obstacle.radius_m=1"],
     "obstacle=ellipsoid": ["obstacle.centre_m=[0,0]", "obstacle.semi_axes_m=[1,2]"],

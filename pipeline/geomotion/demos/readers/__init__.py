@@ -1,6 +1,7 @@
 """Readers: from files to :class:`~geomotion.demos.demonstrations.Demonstrations`, one module per source."""
 
 from geomotion.config import (
+    CoManipulationDataset,
     DatasetConfig,
     FolderDataset,
     GraspAndDropDataset,
@@ -14,6 +15,7 @@ from geomotion.config import (
     PandaPouringJointDataset,
     PandaReachDataset,
     PandaReachJointDataset,
+    PandaSinusoidDataset,
     PlanarSCurveDataset,
     RoboTasks9Dataset,
     RoboTasks9JointDataset,
@@ -27,10 +29,11 @@ from geomotion.demos.generators import (
     panda_joint,
     panda_pouring,
     panda_reach,
+    panda_sinusoid,
     planar,
     straight_lines,
 )
-from geomotion.demos.readers import folder, lasa, lasa_pose, mmm, robotasks9, robotasks9_joint
+from geomotion.demos.readers import comanipulation, folder, lasa, lasa_pose, mmm, robotasks9, robotasks9_joint
 from geomotion.robot.skeleton import Skeleton
 
 __all__ = ["read", "read_skeleton"]
@@ -58,6 +61,8 @@ def read(config: DatasetConfig) -> Demonstrations:
             return lasa.read(config)
         case LasaPoseDataset():
             return lasa_pose.read(config)
+        case CoManipulationDataset():
+            return comanipulation.read(config)
         case RoboTasks9JointDataset():
             return robotasks9_joint.read(config)
         case RoboTasks9Dataset():
@@ -76,6 +81,8 @@ def read(config: DatasetConfig) -> Demonstrations:
             return panda_reach.generate(config)
         case PandaPouringDataset():
             return panda_pouring.generate(config)
+        case PandaSinusoidDataset():
+            return panda_sinusoid.generate(config)
         case GraspAndDropDataset():
             return panda_grasp_and_drop.generate(config)
         case PandaReachJointDataset():

@@ -1,13 +1,12 @@
 """RoboTasks9: end-effector poses of a Franka Panda, taught by hand, nine demonstrations a task."""
 
-import logging
-import os
 from pathlib import Path
 
 import numpy as np
 
 from geomotion.config import RoboTasks9Dataset
 from geomotion.demos.demonstrations import Array, Demonstrations, Trajectory, validate
+from geomotion.demos.readers.downloads import fetched, named_folder
 from geomotion.errors import DatasetError, MissingData
 
 METRES_PER_UNIT = 1e-2  # the source states no unit; centimetres put every pose within the Panda's reach
@@ -22,7 +21,6 @@ SHA256 = {
     "scoop": "670071accdb9c4c80d35762ee20f1180cc8095845ee6d7c9745d20c876c46f55",
     "wineglass": "ad56e3607934bded85dc57c241bd50aba80fc66809cb6e5e54a09950a397ab92",
 }
-DOWNLOAD_TIMEOUT_S = 10.0
 SOURCE = (
     "RoboTasks9: S. Auddy, J. Hollenstein, M. Saveriano, A. Rodriguez-Sanchez, J. Piater, Scalable and Efficient "
     "Continual Learning from Demonstration via a Hypernetwork-generated Stable Dynamics Model, arXiv 2311.03600"
@@ -66,35 +64,12 @@ def _load(path: Path) -> Array:
 
 
 def _find(config: RoboTasks9Dataset) -> Path:
-    root = config.root or os.environ.get(FOLDER_VARIABLE)
-    if root is None:
-        return _download(config.task)
-    path = Path(root).expanduser() / f"{config.task}.npy"
-    if not path.is_file():
-        raise MissingData(f"{path} (RoboTasks9)", _how_to_get(config.task))
-    return path
-
-
-def _how_to_get(task: str) -> str:
-    return f"Get {FOLDER_URL}/{task}.npy and set dataset.root= or {FOLDER_VARIABLE} to its folder."
-
-
-def _download(task: str) -> Path:
-    """The file in the user's cache, fetched once and compared with its published checksum."""
-    import pooch
-
-    pooch.get_logger().setLevel(logging.WARNING)
-    cache = Path(pooch.os_cache("geomotion")) / "robotasks9"
-    try:
-        found = pooch.retrieve(
-            f"{FOLDER_URL}/{task}.npy",
-            known_hash=f"sha256:{SHA256[task]}",
-            fname=f"{task}.npy",
-            path=cache,
-            downloader=pooch.HTTPDownloader(timeout=DOWNLOAD_TIMEOUT_S),
-        )
-    except OSError as error:  # no connection, no permission, no space; requests' errors derive from it
-        raise MissingData(f"RoboTasks9 task {task!r}", f"It could not be downloaded. {_how_to_get(task)}") from error
-    except ValueError as error:  # pooch's word for a wrong checksum
-        raise DatasetError(f"{FOLDER_URL}/{task}.npy", "downloaded file differs from its SHA-256; try again") from error
-    return Path(found)
+    name = f"{config.task}.npy"
+    how_to_get = f"Get {FOLDER_URL}/{name} and set dataset.root= or {FOLDER_VARIABLE} to its folder."
+    folder = named_folder(config.root, FOLDER_VARIABLE)
+    if folder is None:
+        what = f"RoboTasks9 task {config.task!r}"
+        return fetched(f"{FOLDER_URL}/{name}", SHA256[config.task], f"robotasks9/{name}", what, how_to_get)
+    if not (folder / name).is_file():
+        raise MissingData(f"{folder / name} (RoboTasks9)", how_to_get)
+    return folder / name
