@@ -14,7 +14,7 @@ SOURCE = """
 from torch import nn
 
 class Decay(nn.Module):
-    def __init__(self, dim, rate=1.0):
+    def __init__(self, dim, rate=1.0, spring=None):
         super().__init__()
         self.dim = dim
         self.linear = nn.Linear(dim, dim)
@@ -53,10 +53,13 @@ def test_the_goal_is_an_equilibrium(field):
 
 
 def test_a_users_field_gets_its_settings_and_is_found_again(user_module, tmp_path):
-    config = of(schema.CustomField(target="decaying.Decay", settings={"rate": 3.0}))
+    settings = {"rate": 3.0, "spring": {"kind": "stiff", "activation": "LinearField"}}  # by names that we have as well
+    config = of(schema.CustomField(target="decaying.Decay", settings=settings))
     model = models.build(config, GEOMETRY).eval()
     models.save(tmp_path / "model.pt", Skill(model, config, GEOMETRY, ("position_m",), (0,), (1,)))
-    loaded = models.load(tmp_path / "model.pt").field
+    skill = models.load(tmp_path / "model.pt")
+    assert skill.config == config
+    loaded = skill.field
     x = torch.tensor(GEOMETRY.goal) + torch.randn(5, 2)
     for one in (model, loaded):
         torch.testing.assert_close(one(x), -3.0 / 2.5 * (x - torch.tensor(GEOMETRY.goal)))

@@ -10,7 +10,7 @@ from geomotion import config as schema
 from geomotion.export import OnnxPolicy, export_onnx
 from geomotion.models import ModelConfig
 
-from .policy.skills import LINEAR, defaults, policy_of, pose_skill, skill_of, states_of
+from .policy.skills import LINEAR, REMEMBERING, defaults, policy_of, pose_skill, skill_of, states_of
 
 THESIS = ModelConfig(
     schema.IdentityChart(),
@@ -23,6 +23,7 @@ SKILLS = {  # recording takes seconds each
     "potential, with a time law": lambda: skill_of(replace(TIMED, field=schema.PotentialField()), 2),
     "line integral": lambda: skill_of(THESIS, 3),
     "poses": pose_skill,
+    "poses that remember their start": lambda: pose_skill(REMEMBERING),
 }
 
 
@@ -46,6 +47,7 @@ def test_an_exported_policy_gives_the_same_answers_for_any_batch(tmp_path, name)
             "obstacle_centre_m": torch.full((1, min(policy.dim, 3)), 0.12),
             "obstacle_radius_m": torch.tensor([[0.03]]),
             "transverse_rate_per_duration": torch.tensor([[3.0]]),
+            "start_position_m": torch.tensor([[0.12, 0.05, 0.14]]),
         }
         options = {key: values for key, values in changed.items() if key in defaults(policy)}
         for given in (asked, asked | options):

@@ -4,14 +4,21 @@ import re
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 
-from hydra.errors import HydraException, MissingConfigException, OverrideParseException
+from hydra.errors import (
+    ConfigCompositionException,
+    HydraException,
+    MissingConfigException,
+    OverrideParseException,
+)
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, MissingMandatoryValue, OmegaConfBaseException
 
 from geomotion.config import CommandConfig
 from geomotion.errors import UnknownName
-from geomotion_cli.choices import group_options, top_level_names
+from geomotion_cli.choices import CONFIG_TYPES, group_options, program_options, top_level_names
 from geomotion_cli.failures import did_you_mean
+
+_OF_ANOTHER_PROGRAM = re.compile(r"In '(?P<group>\w+)/(?P<option>[^']+)': Could not override '(?P<missing>[^']+)'")
 
 
 def retell(error: Exception) -> str:
@@ -24,6 +31,8 @@ def retell(error: Exception) -> str:
             return f"cannot read {error.override!r}: {reason}; settings are written key=value."
         case MissingMandatoryValue():
             return f"{error.full_key} has no value; set it with {error.full_key}=…"
+        case ConfigCompositionException() if preset := _OF_ANOTHER_PROGRAM.match(str(error)):
+            return _of_another_program(**preset.groupdict())
         case HydraException(__cause__=OmegaConfBaseException() as cause):
             return _value_error(cause)
         case OmegaConfBaseException():
@@ -49,6 +58,17 @@ def _value_error(error: OmegaConfBaseException) -> str:
         return unknown_setting(error.full_key, error.parent_node._get_root())
     reason = _first_sentence(error)
     return f"{error.full_key}: {reason}" if error.full_key else reason
+
+
+def _of_another_program(group: str, option: str, missing: str) -> str:
+    """A preset that changes what only another program has."""
+    chosen = f"{group}={option}"
+    choices = {program: program_options(program).get(group, []) for program in CONFIG_TYPES}
+    owners = [program for program, options in choices.items() if option in options]
+    others = [f"{program} has {', '.join(choices[program])}" for program in CONFIG_TYPES if program not in owners]
+    if not owners or not others:
+        return f"{chosen} changes {missing!r}, which is not there to be changed."
+    return f"{chosen} is a choice of {' and '.join(owners)}, whose setting {missing!r} it changes; {'; '.join(others)}."
 
 
 def _unknown_option(path: str, error: MissingConfigException) -> str:

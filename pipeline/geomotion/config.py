@@ -1414,7 +1414,7 @@ class PolygonObstacle(SolidObstacle):
 
     centre_m: list[float] = default(default_factory=lambda: [0.0, 0.0])
     vertices_m: list[Any] = MISSING  # corners in order, two coordinates each
-    rounding_m: float | None = None  # by which a convex one grows; null: a tenth of the radius of the ball in it
+    rounding_m: float | None = None  # by which it grows; null: a convex one by a tenth of the radius of the ball in it
     convex_hull: bool = False  # whether its convex hull is avoided instead
 
     def __post_init__(self) -> None:
@@ -1433,7 +1433,7 @@ class MeshObstacle(SolidObstacle):
 
     file: str = MISSING
     scale: float = 1.0  # metres in a unit of the file
-    rounding_m: float | None = None  # ncds: by which a convex one grows; null: a tenth of the radius of the ball in it
+    rounding_m: float | None = None  # ncds: by which it grows; null: a convex one by a tenth of the ball in it
     convex_hull: bool = False  # ncds: whether its convex hull is avoided instead
 
     def __post_init__(self) -> None:
@@ -1845,9 +1845,12 @@ class PushConfig:
     def __post_init__(self) -> None:
         _require(self.time_s >= 0, "replay.pushes.time_s", self.time_s, "0 or more")
         _require_positive("replay.pushes", self, "duration_s")
-        given = [vector for vector in (self.force_n, self.displacement_m) if vector is not None]
-        _require(len(given) == 1, "replay.pushes", given, "force_n or displacement_m, one of them")
-        _require(_are_finite(given[0]) and len(given[0]) == 3, "replay.pushes", given[0], "three finite numbers")
+        both = {"force_n": self.force_n, "displacement_m": self.displacement_m}
+        given = {name: vector for name, vector in both.items() if vector is not None}
+        _require(len(given) == 1, "replay.pushes", list(given), "force_n or displacement_m, one of them")
+        for name, vector in given.items():
+            is_vector = _are_finite(vector) and len(vector) == 3
+            _require(is_vector, f"replay.pushes.{name}", vector, "three finite numbers")
 
 
 @dataclass

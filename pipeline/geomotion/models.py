@@ -6,6 +6,7 @@ from dataclasses import field as default
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import nn
 
@@ -17,7 +18,7 @@ from geomotion.dynamics.charts import AnchoredChart, ComposedChart, IdentityChar
 from geomotion.dynamics.conditional import ConditionalLineIntegral, Standing
 from geomotion.dynamics.conditional_linear import ConditionalLinear
 from geomotion.dynamics.embedded import EmbeddedField, RisingClock
-from geomotion.dynamics.fields import Chart, ChartedField, VectorField
+from geomotion.dynamics.fields import Chart, ChartedField, SkillField, VectorField
 from geomotion.dynamics.injective import DecoderChart, decoded
 from geomotion.dynamics.line_integral import DormandPrince, LineIntegralField, LineIntegrator, RungeKutta4
 from geomotion.dynamics.linear import LinearField
@@ -31,6 +32,7 @@ from geomotion.dynamics.regularisers import (
     StateIndependentRegulariser,
     unequal_roots,
 )
+from geomotion.dynamics.start_memory import StartMemory
 from geomotion.dynamics.time_law import ConditionalTimeLaw, SplineTimeLaw
 from geomotion.errors import CorruptArtefact, InvalidSetting
 from geomotion.files import write_tensors
@@ -91,6 +93,10 @@ class Skill:
         """Where the demonstrations end, shape (D,) [m], in the model's precision."""
         return torch.tensor(self.geometry.goal, dtype=next(self.field.parameters()).dtype)
 
+    def begun(self, start: np.ndarray) -> "Skill":
+        """The skill for the motion from this start, which it may remember."""
+        return replace(self, field=self.field.begun(torch.as_tensor(start).to(self.goal)))
+
     @property
     def joints(self) -> int:
         """How many of the first coordinates of a state are joint positions [rad]; 0 beside anything but a pose."""
@@ -120,9 +126,11 @@ def build(config: ModelConfig, geometry: Geometry) -> ChartedField:
                 _refuse_regulariser(config.regulariser, BY_CONSTRUCTION)
                 anchored: Chart = AnchoredChart(chart, torch.tensor(geometry.goal))
                 field, law = _exact_field(exact, dim, context), _time_law(config.time_law, context)
-                has_own_clock = isinstance(field, EmbeddedField) and law is not None
+                has_own_clock = isinstance(field, SkillField) and law is not None
                 transverse = RisingClock(exact.transverse_start, exact.transverse_rise) if has_own_clock else None
-                return ChartedField(anchored, field, geometry.duration_s, law, transverse)
+                # a condition moves where motions start from
+                memory = _start_memory(exact, dim, geometry) if transverse is not None and not context else None
+                return ChartedField(anchored, field, geometry.duration_s, law, transverse, memory)
             case _ if not isinstance(config.time_law, schema.NoTimeLaw):
                 raise InvalidSetting("time_law", "learned", "none, but for field=linear and field=potential")
             case schema.AnchoredField() as anchored_field:
@@ -173,6 +181,11 @@ def _time_law(config: schema.TimeLawConfig, context: int) -> SplineTimeLaw | Con
         return None
     settings = config.knots, config.min_speed
     return ConditionalTimeLaw(context, *settings) if context else SplineTimeLaw(*settings)
+
+
+def _start_memory(config: schema.ExactField, dim: int, geometry: Geometry) -> StartMemory | None:
+    durations = config.start_fade_durations
+    return None if durations is None else StartMemory(dim, durations * geometry.duration_s)
 
 
 FIELDS_WITH_CONDITIONS = "a field that knows them: field=linear, potential or line_integral"
@@ -368,7 +381,10 @@ def _component(document: Mapping[str, Any]) -> Any:
         schema.NoTimeLaw, schema.LearnedTimeLaw,
     )  # fmt: skip
     kind = {kind.__name__: kind for kind in kinds}[document["kind"]]
-    values = {name: _value(value) for name, value in document.items() if name != "kind"}
+    settings = {name: value for name, value in document.items() if name != "kind"}
+    if kind is schema.CustomField:  # whose settings are the user's, by whatever names
+        return kind(**settings)
+    values = {name: _value(value) for name, value in settings.items()}
     for name, enum in (
         ("activation", schema.Activation), ("base_point", schema.BasePoint),
         ("base_velocity", schema.BaseVelocity), ("integrator", schema.Integrator),

@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Int
+from jaxtyping import Bool
+from scipy.spatial import cKDTree
 
 from geomotion.config import RiemannianSafety
 from geomotion.dynamics.fields import ChartedField, VectorField
@@ -71,13 +72,22 @@ class SafeSkill:
 
     def safe_field(self, onward: Onward | None = along_geodesic) -> SafeField:
         """The latent field that stays in the region, in double precision."""
-        return SafeField(self.free_field(), self.region, onward)
+        return SafeField(self.free_field(), self.region, onward, fastest_return=self.top_speed)
 
     def charted_field(self) -> ChartedField:
         """The same in the robot's coordinates, in the precision of the model."""
         free = self.skill.field
-        safe = SafeField(free.field, deepcopy(self.region).to(self.skill.goal))
+        safe = SafeField(free.field, deepcopy(self.region).to(self.skill.goal), fastest_return=self.top_speed)
         return ChartedField(free.chart, safe, free.time_unit_s, free.time_law, free.transverse_law).eval()
+
+    @cached_property
+    def top_speed(self) -> float:
+        """The highest latent speed at demonstrated states, per time unit; a way back into the region is no faster."""
+        field = self.free_field()
+        codes = torch.from_numpy(np.concatenate(self.surface.codes))
+        with torch.no_grad():
+            velocity = field(torch.nn.functional.pad(codes, (0, field.dim - PLANE)))
+        return float(velocity[:, :PLANE].norm(dim=-1).max())
 
     @torch.no_grad()
     def clearance_m(self, points: Float[np.ndarray, "*batch 2"]) -> Float[np.ndarray, "*batch"]:
@@ -93,6 +103,23 @@ class SafeSkill:
             positions = self.surface.plane.positions(torch.from_numpy(flat[near]))[:, 0].numpy()
             found[near] = nearest_body_m(self.bodies, positions)
         return np.asarray(found.reshape(points.shape[:-1]))
+
+    @torch.no_grad()
+    def to_border_m(self, points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, " point"]:
+        """Distance between positions at latent points and those where S = ρ; negative outside of the region [m]."""
+        codes = torch.from_numpy(points)
+        away_m = self._border_m.query(self.surface.plane.positions(codes)[:, 0].numpy())[0]
+        return np.asarray(np.where(self.region.is_safe(codes).numpy(), away_m, -away_m))
+
+    @cached_property
+    def _border_m(self) -> cKDTree:
+        """Positions where edges of the grid cross S = ρ [m]."""
+        grid = self.nodes.grid
+        beyond = -np.log(distance_on_grid(self.reasons) / self.region.levels.impenetrable)
+        first, last = grid.edges[(beyond[grid.edges] > 0).sum(axis=1) == 1].T
+        share = beyond[first] / (beyond[first] - beyond[last])
+        crossings = grid.nodes[first] + share[:, None] * (grid.nodes[last] - grid.nodes[first])
+        return cKDTree(self.surface.plane.positions(torch.from_numpy(crossings))[:, 0].numpy())
 
     @cached_property
     def node_clearance_m(self) -> Float[np.ndarray, " node"]:
@@ -127,9 +154,13 @@ def safe_skill(
         config: ρ, ν and how support and obstacles are seen.
 
     Raises:
-        InvalidSetting: If the skill does not have two dimensions, the goal is not in the region, or an obstacle moves.
+        InvalidSetting: If the skill does not have two dimensions or remembers starts, the goal is not in the region, or
+            an obstacle moves.
         MissingData: If obstacles contain no node of the support.
     """
+    if skill.field.start_memory is not None:
+        expected = "null and training=trajectory: a plane without starts says little of where motions may be"
+        raise InvalidSetting("field.start_fade_durations", "a memory of starts beside safety=riemannian", expected)
     levels = Levels(config.rho, config.nu, config.steepness)
     with torch.no_grad():
         surface = SkillSurface.of(skill, states, config.density_bandwidth, config.density_power)
@@ -150,8 +181,11 @@ def safe_skill(
     goal = surface.encoded(skill.goal[None])
     goal_node = int(nodes.grid.nearest(goal)[0])
     first_nodes = nodes.grid.nearest(np.stack([one[0] for one in surface.codes]))
-    support, _ = _region(nodes, graph, reasons[:1], levels, first_nodes, goal_node)
-    region, way = _region(nodes, graph, reasons, levels, first_nodes, goal_node)
+    supported, supported_way = _ways(graph, reasons[:1], levels, goal_node)
+    distance, way = _ways(graph, reasons, levels, goal_node)
+    passage = narrowest_passage(nodes.grid, distance, first_nodes[np.isfinite(way[first_nodes])], goal_node)
+    support = SafetyRegion(nodes.grid, supported, supported_way, levels)  # steers nothing
+    region = SafetyRegion(nodes.grid, distance, way, levels.below(passage))
     return SafeSkill(
         skill, surface, nodes, nodes.volume(factor), tuple(reasons), support, region, graph, way, tuple(bodies), goal
     )
@@ -171,18 +205,10 @@ def _factor(body: MovingBody, nodes: EmbeddedGrid, felt_m: float, gain: float) -
     return ambient_factor(body.signed_distance(nodes.decoded_m, 0.0), max(body.body.inradius, felt_m), gain)
 
 
-def _region(
-    nodes: EmbeddedGrid,
-    graph: GeodesicGraph,
-    reasons: Sequence[Reason],
-    levels: Levels,
-    first_nodes: Int[np.ndarray, " demo"],
-    goal_node: int,
-) -> tuple[SafetyRegion, Float[np.ndarray, " node"]]:
-    """The region for some reasons, and the ways to the goal in it, which the graph then has.
-
-    Wherever a demonstration starts, the goal can be reached unless the region has no way at all.
-    """
+def _ways(
+    graph: GeodesicGraph, reasons: Sequence[Reason], levels: Levels, goal_node: int
+) -> tuple[Float[np.ndarray, " node"], Float[np.ndarray, " node"]]:
+    """S at the nodes for some reasons, and the ways to the goal where it allows them, which the graph then has."""
     distance = distance_on_grid(reasons)
     is_safe: Bool[np.ndarray, " node"] = distance > levels.impenetrable
     if not is_safe[goal_node]:
@@ -190,7 +216,4 @@ def _region(
             raise InvalidSetting("safety.nu", levels.inactive, "more: the goal is outside of the support of the data")
         raise InvalidSetting("obstacle", "over the goal", "one that leaves the goal free, or a smaller safety.margin_m")
     graph.close(~is_safe)
-    way = graph.costs_from(goal_node)
-    connected = first_nodes[np.isfinite(way[first_nodes])]
-    passage = narrowest_passage(nodes.grid, distance, connected, goal_node)
-    return SafetyRegion(nodes.grid, distance, way, levels.below(passage)), way
+    return distance, graph.costs_from(goal_node)

@@ -6,6 +6,7 @@ from torch.testing import assert_close
 
 from geomotion.baselines.clusters import nearest_centres
 from geomotion.baselines.seds import StableGaussianMixture
+from geomotion.errors import InvalidSetting
 
 RATE = 0.3
 
@@ -73,3 +74,10 @@ def test_clusters_are_those_that_lie_apart():
 def test_no_cluster_is_empty_where_points_coincide():
     points = torch.cat([torch.zeros(50, 2), torch.tensor([[1.0, 0.0], [0.0, 1.0]])])
     assert len(nearest_centres(points, 3).unique()) == 3
+
+
+def test_more_components_than_different_states_are_refused():
+    states = torch.tensor([[1.0, 0.0], [0.5, 0.0]])[:, None].expand(-1, 30, -1)
+    mixture = StableGaussianMixture(2, 3, RATE)
+    with pytest.raises(InvalidSetting, match=r"field\.components=3 .* at most 2"):
+        mixture.start_from([torch.arange(30.0)] * 2, list(states), list(states))

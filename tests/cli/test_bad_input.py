@@ -124,6 +124,11 @@ def test_settings_that_make_no_sense_are_refused(what, refused):
     refused(("ncds", "train", *toy, *settings), words, stage, status)
 
 
+def test_pictures_need_trajectories_in_closed_form_and_say_so_at_once(refused):
+    command = ("ncds", "run", "dataset=panda/grasp_and_drop", "field=potential", "training=velocity")
+    refused(command, "encoder.trajectory_weight=1.0 is not valid: expected 0, but for field=linear", "ingest", 2)
+
+
 def recordings(folder: Path, count: int, points: int = 30, **columns) -> Path:
     folder.mkdir()
     for number in range(count):

@@ -93,6 +93,13 @@ def test_a_mistake_gets_one_helpful_line_and_status_two(command, mistake):
     assert "HYDRA_FULL_ERROR" not in answer.err
 
 
+def test_a_preset_of_the_other_program_is_named_as_such(command):
+    answer = command("train", "dataset=robotasks9/pouring", "space=R3xSO3", program="gms")
+    assert (answer.status, answer.out) == (2, "")
+    assert "space=R3xSO3 is a choice of ncds" in answer.err
+    assert "gms has demonstrated, joint, pose." in answer.err
+
+
 @pytest.mark.parametrize("run", ["12e45678", "0123456e", "1234567890"])
 def test_the_beginning_of_a_run_id_is_not_taken_for_a_number(monkeypatch, tmp_path, undisturbed, run):
     named = []

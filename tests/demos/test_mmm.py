@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -189,6 +191,17 @@ def test_the_model_beside_the_recording_is_found_and_scaled(recording):
     places = skeleton.positions(np.zeros((1, 3)), NAMES, np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]))
     np.testing.assert_allclose(places[0, 2], [0, 0, 1.8 * 0.45])
     assert places[0, 2, 2] < read_skeleton(MmmDataset(path=path, height_m=2.0), read(config)).nodes[1].place[2][3] * 2
+
+
+def test_a_file_that_merely_lies_beside_the_recording_does_not_stop_it(recording, caplog):
+    path = recording(legacy(names=["a", "b", "c"]))
+    for text, words in ((BODY, "none of the recorded joints a, b, c"), ("<Robot>", "mmm.xml")):
+        recording(text, "mmm.xml")
+        caplog.clear()
+        assert read_skeleton(MmmDataset(path=path), loaded(path)) is None
+        assert words in caplog.text and "the person is not drawn by it" in caplog.text
+        with pytest.raises(DatasetError, match=r"mmm\.xml"):
+            read_skeleton(MmmDataset(path=path, skeleton=str(Path(path).with_name("mmm.xml"))), loaded(path))
 
 
 def test_a_model_that_does_not_fit_is_refused(recording):

@@ -9,11 +9,14 @@ from torch.testing import assert_close
 from geomotion.dynamics.charts import AnchoredChart, ComposedChart, ScalingChart
 from geomotion.dynamics.conditional import ConditionalLineIntegral, Standing, given
 from geomotion.dynamics.conditional_linear import ConditionalLinear
+from geomotion.dynamics.embedded import EmbeddedField, RisingClock
 from geomotion.dynamics.fields import ChartedField
 from geomotion.dynamics.line_integral import LineIntegralField
+from geomotion.dynamics.linear import LinearField
 from geomotion.dynamics.potential import PotentialField
 from geomotion.dynamics.quadrature import GaussLegendre
 from geomotion.dynamics.regularisers import StateDependentRegulariser
+from geomotion.dynamics.rollout import rollout
 from geomotion.dynamics.time_law import ConditionalTimeLaw
 from geomotion.networks.coupling import CouplingFlow
 from geomotion.networks.mlp import MLP, JacobianRoot, SkewMatrix
@@ -98,6 +101,32 @@ def test_trajectories_in_closed_form_keep_the_condition():
     joint = field.solve(in_frame(x, condition), times_s / FRAME["slowdown"])
     assert_close(plain.solve(x, times_s), joint[..., :2] * FRAME["stretch"] + shift_of(condition))
     assert_close(joint[..., 2:], condition.expand(4, 7, -1))
+
+
+def embedded() -> ChartedField:
+    """A skill of one dimension beside two others, which have a clock of their own, in a flow with conditions."""
+    torch.manual_seed(0)
+    field = Standing(EmbeddedField(LinearField(1, RATE, 1.0), 3, 5.0), CONTEXT)
+    chart = ComposedChart(ScalingChart(torch.zeros(3 + CONTEXT), 0.1), CouplingFlow(3, 4, 16, [0.5, 1.0], 1.5, CONTEXT))
+    anchored, clock = AnchoredChart(chart, torch.zeros(3 + CONTEXT)), RisingClock(0.1, 0.4)
+    return disturbed(ChartedField(anchored, field, TIME_UNIT_S, ConditionalTimeLaw(CONTEXT, 6, 0.2), clock))
+
+
+def test_what_is_beside_an_embedded_skill_has_its_own_clock_under_every_condition():
+    field, times_s = embedded(), torch.linspace(0, 4, 81, dtype=torch.float64)
+    x = 0.1 * torch.randn(4, 3, generator=torch.Generator().manual_seed(6), dtype=torch.float64)
+    shift, still = torch.zeros(3, dtype=torch.float64), field.transverse_law
+    for condition in conditions(2):
+        plain = given(field, condition, shift)
+        assert plain.transverse_law is still
+        joint = torch.cat([x, condition.expand(4, -1)], -1)
+        exact = field.solve(joint, times_s)
+        assert_close(plain.solve(x, times_s), exact[..., :3])
+        assert_close(rollout(plain, x, times_s, method="rk4", substeps=4).states, exact[..., :3], rtol=0, atol=1e-5)
+        assert_close(field.velocity(joint, times_s[:4, None])[:, :3], plain.velocity(x, times_s[:4, None]))
+        beside = plain.chart.to_latent(exact[:, -1, :3])[:, 1:] / plain.chart.to_latent(x)[:, 1:]
+        passed = still.progress(times_s[-1] / TIME_UNIT_S)
+        assert_close(beside, (-5.0 * passed).exp().expand(4, 2), rtol=1e-4, atol=0)
 
 
 def test_states_of_several_conditions_are_followed_side_by_side():

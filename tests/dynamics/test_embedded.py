@@ -5,9 +5,11 @@ import torch
 
 from geomotion.dynamics.certificate import Claim, certify, slowest_rate
 from geomotion.dynamics.charts import IdentityChart, TurnedChart
+from geomotion.dynamics.conditional import Standing
 from geomotion.dynamics.embedded import EmbeddedField, RisingClock
 from geomotion.dynamics.fields import ChartedField
 from geomotion.dynamics.linear import LinearField
+from geomotion.dynamics.potential import PotentialField
 from geomotion.dynamics.rollout import rollout
 from geomotion.dynamics.time_law import SplineTimeLaw
 
@@ -39,6 +41,15 @@ def test_closed_form_is_what_a_solver_finds() -> None:
     exact = model().solve(starts(4), times)
     solved = rollout(model(), starts(4), times, method="rk4", substeps=4).states
     torch.testing.assert_close(exact, solved, rtol=0, atol=1e-4)
+
+
+def test_around_a_potential_field_there_is_no_closed_form() -> None:
+    around = EmbeddedField(PotentialField(SKILL_DIM, 8, 1.0, 2.0), DIM, 8.0)
+    for one in (around, Standing(around, 2)):
+        assert not ChartedField(IdentityChart(one.dim), one, 2.0).is_solvable
+    start, times = torch.zeros(1, DIM), torch.linspace(0, 1, 5)
+    assert rollout(ChartedField(IdentityChart(DIM), around, 2.0), start, times).method == "rk4"
+    assert model().is_solvable and ChartedField(IdentityChart(DIM + 2), Standing(field(), 2), 2.0).is_solvable
 
 
 def test_a_later_start_goes_on_as_before() -> None:

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from geomotion.errors import InvalidSetting, MissingData
-from geomotion.networks.image_encoder import FEATURES, ImageEncoder
+from geomotion.networks.image_encoder import FEATURES, ImageEncoder, digest_of_weights
 
 PICTURES = np.random.default_rng(0).integers(0, 256, (3, 32, 32, 3), dtype=np.uint8)
 
@@ -34,6 +34,14 @@ def test_weights_from_a_folder_give_the_same_features(encoder, tmp_path):
     stored = ImageEncoder(str(tmp_path))
     assert stored.digest == encoder.digest and stored.name == str(tmp_path)
     torch.testing.assert_close(stored(PICTURES), encoder(PICTURES), rtol=0, atol=0)
+
+
+def test_other_weights_behind_the_same_name_have_another_digest(encoder, tmp_path):
+    encoder.network.save_pretrained(tmp_path)
+    before = digest_of_weights(str(tmp_path))
+    ImageEncoder("random", seed=5).network.save_pretrained(tmp_path)
+    digest_of_weights.cache_clear()  # as in another process
+    assert before == encoder.digest != digest_of_weights(str(tmp_path))
 
 
 def test_tiles_are_parts_of_the_picture(encoder):

@@ -101,6 +101,17 @@ def test_the_avoided_body_contains_the_given_one(bodies, name):
     assert grown.max() < 1.13
 
 
+@pytest.mark.parametrize(("name", "by"), [("l", 0.05), ("l", 0.5), ("star", 0.5), ("bumpy mesh", 0.2)])
+def test_a_grown_body_contains_all_that_is_near_the_given_one_and_not_much_more(bodies, name, by):
+    boundary, body = bodies[name]
+    grown = enclose(boundary, rounding=by)
+    points = torch.from_numpy(boundary.samples(body.reference.numpy(), 0.05 if body.dim == 3 else 0.005)[0])
+    around = points[:, None] + by * directions(body.dim)[:50]
+    assert grown.level(around).max() < 1
+    away = torch.cdist(surface_points(grown, directions(body.dim)), points).amin(dim=1)
+    assert away.max() < by + 0.3 * body.bounding_radius
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_distances_never_exceed_the_true_one(bodies, name):
     _, body = bodies[name]

@@ -7,6 +7,7 @@ from torch import nn
 
 from geomotion.errors import InvalidSetting, MissingData
 from geomotion.manifolds.grid import LatentGrid
+from geomotion.obstacles import safe_field
 from geomotion.obstacles.safe_field import SafeField, against_geodesic, follow_safely
 from geomotion.obstacles.safety_region import (
     Levels,
@@ -129,7 +130,7 @@ def test_nothing_crosses_the_border_but_inwards(direction):
     border = border[(safe.distance(border) - LEVELS.guarded).abs() < 1e-6]
     assert len(border) > 10
     sight, wanted = safe.sight(border), direction * Funnel()(border)
-    velocity = SafeField(Funnel(), safe).steered(sight, wanted)
+    velocity = SafeField(Funnel(), safe).steered(border, wanted)
     crossing, wanted_crossing = ((v * sight.normal).sum(-1) for v in (velocity, wanted))
     assert (crossing > -1e-5).all()
     is_leaving = wanted_crossing > 0.1
@@ -174,12 +175,46 @@ def test_starts_outside_come_in():
     assert safe.is_safe(states[:, -1]).all()
 
 
+@pytest.mark.parametrize("kind", ["far out", "in the obstacle"])
+def test_the_way_in_leads_in_from_everywhere_and_is_never_faster_than_allowed(kind):
+    """Also where S is flat: far from the data, and in the middle of the obstacle, where its gradient vanishes."""
+    flat = Reason("far out", np.minimum(SUPPORT.volume, SUPPORT.scale * 50), SUPPORT.scale)
+    safe = region(flat, OBSTACLE)
+    angles = torch.arange(40).double() * 2 * np.pi / 40
+    around = torch.stack([angles.cos(), angles.sin()], dim=1)
+    outside = 3 * around if kind == "far out" else torch.tensor([0.4, 0.0]).double() + 0.1 * around
+    assert not safe.is_safe(outside).any()
+    field = SafeField(Funnel(), safe, fastest_return=2.0)
+    assert (field(outside).norm(dim=1) <= 2 + 1e-9).all()
+    states, _ = follow_safely(field, outside, torch.linspace(0, 2, 101).double())
+    assert safe.is_safe(states[:, -1]).all()
+
+
 def test_large_steps_are_halved_and_never_jump_over_what_is_unsafe():
     safe = region(SUPPORT, OBSTACLE)
     fast = SafeField(Flight(), safe, onward=None)
     states, waited = follow_safely(fast, starts(safe, 20), torch.linspace(0, 0.6, 3).double())
     assert safe.is_safe(states).all()
     assert waited == 0
+
+
+def test_however_wild_a_field_is_the_work_is_bounded_and_motions_wait_in_the_region(monkeypatch):
+    monkeypatch.setattr(safe_field, "FREE_STEPS", 100)
+    monkeypatch.setattr(safe_field, "MEAN_STEPS", 5)
+
+    class Wild(Funnel):
+        calls = 0
+
+        def forward(self, z: torch.Tensor) -> torch.Tensor:
+            self.calls += 1
+            return 1e4 * torch.stack([(40 * z[:, 1]).sin(), (40 * z[:, 0]).cos()], dim=1)
+
+    safe, wild = region(SUPPORT, OBSTACLE), Wild()
+    states, waited = follow_safely(SafeField(wild, safe), starts(safe, 5), torch.linspace(0, 1, 41).double())
+    assert safe.is_safe(states).all()
+    assert waited > 0
+    fewer = 2 ** (safe_field.FEWER_HALVINGS + 1)
+    assert wild.calls <= 4 * (100 + 2 ** (safe_field.MAX_HALVINGS + 1) + 41 * max(5, fewer))
 
 
 def test_a_motion_cannot_tunnel_through_a_wall():

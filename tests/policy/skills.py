@@ -14,6 +14,13 @@ LINEAR = ModelConfig(schema.FlowChart(layers=2, features=8), schema.LinearField(
 EMBEDDED = ModelConfig(
     schema.FlowChart(layers=2, features=8), schema.LinearField(skill_dim=2), schema.NoRegulariser(), 1
 )
+REMEMBERING = ModelConfig(
+    schema.FlowChart(layers=2, features=8),
+    schema.LinearField(skill_dim=1, start_fade_durations=1.0),
+    schema.NoRegulariser(),
+    1,
+    schema.LearnedTimeLaw(knots=5),
+)
 SIZE_M = 0.1
 REFERENCE = (0.5, 0.5, -0.5, 0.5)
 
@@ -29,6 +36,8 @@ def skill_of(
     with torch.no_grad():
         for parameter in field.parameters():
             parameter.add_(0.1 * torch.randn(parameter.shape, generator=generator))
+        if field.start_memory is not None:
+            field.start_memory.learn(states_of(dim, 5))
     return Skill(field.eval(), config, geometry, channels, (0,), (), pose)
 
 

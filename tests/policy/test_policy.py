@@ -12,7 +12,7 @@ from geomotion.obstacles.solids import Sphere
 from geomotion.obstacles.ways import own_way
 from geomotion.policy.ports import Status
 
-from .skills import EMBEDDED, LINEAR, REFERENCE, SIZE_M, ask, policy_of, pose_skill, skill_of, states_of
+from .skills import EMBEDDED, LINEAR, REFERENCE, REMEMBERING, SIZE_M, ask, policy_of, pose_skill, skill_of, states_of
 
 
 def measured(skill, states):
@@ -36,6 +36,18 @@ def test_velocities_of_a_pose_are_its_twist_whatever_the_length_and_sign_of_the_
     answer = ask(policy_of(skill), **told)
     assert_close(answer["velocity_m_per_s"], twist.velocity, rtol=1e-4, atol=1e-6)
     assert_close(answer["angular_velocity_rad_per_s"], twist.omega, rtol=1e-4, atol=1e-5)
+
+
+def test_a_start_that_is_told_is_remembered():
+    skill, states = pose_skill(REMEMBERING), states_of(6)
+    policy, told, elapsed_s = policy_of(skill), measured(skill, states), torch.full((20, 1), 0.7)
+    start = {f"start_{name}": values[:1] for name, values in told.items()}
+    for asked, field in ((start, skill.field.begun(states[:1])), ({}, skill.field)):
+        twist = skill.pose.twist(states, field.velocity(states, elapsed_s))
+        answer = ask(policy, **told, **asked, elapsed_s=elapsed_s)
+        assert_close(answer["velocity_m_per_s"], twist.velocity, rtol=1e-4, atol=1e-5)
+        assert_close(answer["angular_velocity_rad_per_s"], twist.omega, rtol=1e-4, atol=1e-5)
+    assert set(start) == {one.name for one in policy.inputs if one.name.startswith("start_")}
 
 
 def test_joints_are_called_so_and_meet_no_balls():

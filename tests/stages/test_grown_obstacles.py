@@ -1,12 +1,25 @@
 """Obstacles that are grown for a point that stands for a larger body."""
 
+import numpy as np
 import pytest
 import torch
+import trimesh
 
 from geomotion import config as schema
-from geomotion.stages.scene import build_obstacle, grown
+from geomotion.stages.scene import around_obstacles, build_obstacle, grown
 
 BY_M = 0.05
+
+
+class Straight(torch.nn.Module):
+    """Along the first axis."""
+
+    dim = 3
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return torch.tensor([1.0, 0.0, 0.0]).expand_as(x)
+
+
 ORIGIN = [0.1, 0.0, -0.2]
 BODIES = {
     "sphere": schema.SphereObstacle(centre_m=ORIGIN, radius_m=0.1),
@@ -31,3 +44,16 @@ def test_several_are_grown_each_and_free_space_stays_free():
         pytest.approx([0.2, 0.3, 0.4]),
     ]
     assert grown(schema.NoObstacle(), BY_M) == schema.NoObstacle()
+
+
+def test_a_mesh_that_is_not_convex_is_kept_clear_of_too(tmp_path):
+    """A ball with dents: what the field goes around is as far away as is asked for, at least."""
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    ball.vertices *= 0.1 + 0.04 * np.cos(3 * ball.vertices[:, :1]) * np.cos(2 * ball.vertices[:, 1:2])
+    ball.export(tmp_path / "dented.stl")
+    config = schema.MeshObstacle(centre_m=[0.3, 0.0, 0.0], file=str(tmp_path / "dented.stl"))
+    goal = torch.tensor([2.0, 0.0, 0.0])
+    field = around_obstacles(grown(config, BY_M), Straight(), goal, 3)
+    surface = torch.from_numpy(np.asarray(ball.sample(500, seed=0))).float() + torch.tensor([0.3, 0.0, 0.0])
+    directions = torch.nn.functional.normalize(torch.randn(500, 3, generator=torch.Generator().manual_seed(0)), dim=-1)
+    assert (field.obstacles[0].level(surface + BY_M * directions) < 1).all()

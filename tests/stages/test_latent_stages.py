@@ -61,6 +61,9 @@ def stage_run(folder) -> StageRun:
     return run
 
 
+FREE = schema.NoObstacle()
+
+
 @pytest.fixture(scope="module", params=[LINE_INTEGRAL, EXACT], ids=["line integral", "exact"])
 def artefacts(request, tmp_path_factory) -> dict[str, Artefacts]:
     model, training = request.param
@@ -100,11 +103,11 @@ def test_the_matrix_of_the_line_integral_is_judged_on_codes(artefacts):
     assert found.arrays["claimed_eigenvalue"].shape == (4,)
 
 
-def roll(artefacts, folder, transition_s: float | None) -> np.ndarray:
+def roll(artefacts, folder, transition_s: float | None, obstacle: schema.ObstacleConfig = FREE) -> np.ndarray:
     config = schema.RolloutConfig(
         starts_m=[[0.1, 0.03, -0.04, 0.02]], duration_s=2.0, points=17, transition_s=transition_s
     )
-    stage = RolloutStageConfig(config, schema.SolverConfig(), schema.NoObstacle())
+    stage = RolloutStageConfig(config, schema.SolverConfig(), obstacle)
     rollout(stage, artefacts, stage_run(folder))
     (found,) = storage.load(folder / "rollouts").trajectories
     return found.channels["position_m"]
@@ -121,6 +124,19 @@ def test_rollouts_are_led_to_the_manifold_or_stay_beside_it(artefacts, tmp_path)
     np.testing.assert_allclose(led[0], beside[0], atol=1e-6)
     assert offsets(beside).min() > 0.2 * offsets(beside)[0]
     assert offsets(led)[4:].max() < 1e-3 * offsets(led)[0]
+
+
+def test_obstacles_move_on_during_the_transition(artefacts, tmp_path):
+    """One that crosses the start while the motion is led, and is gone when it is followed: nothing but its distance."""
+    free = roll(artefacts, tmp_path / "free", 0.5)
+    away, speed = np.array([0.0, 0.0, 0.0, 1.0]), 40.0
+    ball = schema.SphereObstacle(
+        centre_m=(free[2] - 0.25 * speed * away).tolist(), radius_m=0.05, velocity_m_per_s=(speed * away).tolist()
+    )
+    passed = roll(artefacts, tmp_path / "passed", 0.5, ball)
+    np.testing.assert_allclose(passed, free, atol=2e-3)
+    (row,) = read_json(tmp_path / "passed/rollouts.json")["rollouts"]
+    assert row["clearance_m"] == pytest.approx(-0.05, abs=0.01)
 
 
 def test_a_transition_has_to_end_before_the_rollout(artefacts, tmp_path):

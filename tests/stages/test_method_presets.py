@@ -36,3 +36,12 @@ def test_the_joint_recordings_of_the_table_have_one_goal(configurations):
     dataset = OmegaConf.to_object(compose("ncds", overrides=["dataset=robotasks9_joint/pouring_one_elbow"])).dataset
     assert isinstance(dataset, schema.RoboTasks9JointDataset)
     assert (dataset.elbow.solutions, dataset.held_out) == (1, 2)
+
+
+def test_starts_beside_the_manifold_are_those_of_a_decoder_and_of_an_embedded_skill(configurations):
+    overrides = ["experiment=thesis/fig_6_10"]
+    study = OmegaConf.to_object(compose("ncds", overrides=overrides)).study
+    thesis, ours = (one.config for one in compose_cells("ncds", replace(study, seeds=[0]), overrides))
+    assert isinstance(thesis.chart, schema.InjectiveVaeChart) and isinstance(thesis.field, schema.LineIntegralField)
+    assert thesis.chart.latent_dim == ours.field.skill_dim == 2
+    assert set(study.figures) <= set(NCDS.study_figures)

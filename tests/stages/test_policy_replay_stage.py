@@ -31,7 +31,7 @@ UNTRAINED = ModelConfig(
 QUIET = schema.ReplayConfig(film=False, pushes=[], duration_s=0.3, control_hz=30.0)
 
 
-def demonstrations(shift_m: float = 0.0) -> Demonstrations:
+def demonstrations(shift_m: float | np.ndarray = 0.0) -> Demonstrations:
     """From home to the side, with a turn about the vertical; joints and poses of the same motions."""
     ways = np.linspace(0, 1, 40)[:, None]
     found = []
@@ -39,7 +39,7 @@ def demonstrations(shift_m: float = 0.0) -> Demonstrations:
         joints = panda.HOME_RAD + ways * np.array([0.5 + turn, 0.2, 0.0, 0.1, turn, 0.0, 0.3])
         position, orientation = panda_chain("grasp_target").pose(joints)
         channels = {
-            "position_m": position + np.array([shift_m, 0.0, 0.0]),
+            "position_m": position + shift_m,
             "orientation_wxyz": orientation,
             "joints_rad": joints,
         }
@@ -48,7 +48,7 @@ def demonstrations(shift_m: float = 0.0) -> Demonstrations:
     return preprocess(shown, schema.PreprocessConfig())
 
 
-def learned(folder, kind: str, shift_m: float) -> dict[str, Artefacts]:
+def learned(folder, kind: str, shift_m: float | np.ndarray) -> dict[str, Artefacts]:
     """What the stages before leave, with a field that leads straight to the goal."""
     shown = demonstrations(shift_m)
     storage.save(shown, folder / "ingest")
@@ -119,6 +119,14 @@ def test_without_pushes_of_its_own_a_motion_is_pushed_aside_by_5_cm(replayed):
     assert 0.03 < found["pushed_m"] < 0.055
 
 
+def test_a_start_inside_the_arm_itself_is_said(replayed):
+    """As of handwriting, which lies around the origin: the arm's base stands there."""
+    home_m = panda_chain("grasp_target").pose(panda.HOME_RAD)[0]
+    folder, document = replayed(shift_m=np.array([0.1, 0.0, 0.0]) - home_m)
+    assert not document["executed"] and "hit itself at the start" in document["reason"]
+    assert [path.name for path in folder.iterdir()] == ["replay.json"]
+
+
 def test_a_start_out_of_reach_is_said(replayed):
     folder, document = replayed(shift_m=1.5)
     assert not document["executed"]
@@ -153,7 +161,7 @@ def test_what_does_not_fit_is_refused(replayed, kind, replay, expected):
     ("settings", "expected"),
     [
         ({"pushes": [{"time_s": 1.0}]}, "one of them"),
-        ({"pushes": [{"time_s": 1.0, "force_n": [1.0, 2.0]}]}, "three finite numbers"),
+        ({"pushes": [{"time_s": 1.0, "force_n": [1.0, 2.0]}]}, r"replay\.pushes\.force_n=.* three finite numbers"),
         ({"goal_changes": [{"time_s": 2.0, "shift_m": [0.0, 0.0, 0.1]}] * 2}, "times in order"),
         ({"noise_m": -0.1}, "0 or more"),
     ],

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from geomotion.errors import CorruptArtefact, MissingArtefact
+from geomotion.stages.ingest import SKELETON
 from geomotion.stages.report import ReportConfig, report
 from geomotion.tracking import Artefacts, StageRun
 
@@ -158,6 +159,16 @@ def test_page_asks_for_nothing_outside_itself(stages, tmp_path):
         assert kind == "data:image/png;base64"
         assert b64decode(content).startswith(b"\x89PNG")
     assert not re.search(r"https?://|@import|url\(|<script|<link|<iframe", page)
+
+
+@pytest.mark.parametrize("has_skeleton", [True, False])
+def test_why_no_person_is_drawn_is_said(stages, tmp_path, has_skeleton):
+    inputs = stages()
+    write(inputs["ingest"].folder / "config.json", {"kind": "MmmDataset"})
+    if has_skeleton:
+        write(inputs["ingest"].folder / SKELETON, {"nodes": []})
+    text = text_of(page_of(inputs, tmp_path))
+    assert ("the skill has no joints" in text, "beside the recording" in text) == (has_skeleton, not has_skeleton)
 
 
 def test_pictures_are_shown_at_one_scale(stages, tmp_path):

@@ -103,6 +103,13 @@ def test_corners_are_further_starts_and_drawn_apart(inputs, run):
         np.testing.assert_allclose(arrays["corner_rollout_0"][0], [-0.02, -0.014])
 
 
+def test_starts_far_from_what_was_demonstrated_are_named(inputs, run, caplog):
+    starts = schema.RolloutConfig(starts_m=[[0.1, 0.01], [0.1, 2.0]], points=20)
+    rollout(RolloutStageConfig(starts, schema.SolverConfig(), schema.NoObstacle()), inputs, run)
+    (warning,) = [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
+    assert "start 1 is far outside: coordinate 1 is" in warning
+
+
 def test_free_space_keeps_the_closed_form_and_has_no_clearance(inputs, run):
     rollout(stage_config(schema.NoObstacle()), inputs, run)
     document = read_json(run.folder / "rollouts.json")

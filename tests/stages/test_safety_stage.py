@@ -13,10 +13,13 @@ from geomotion import models
 from geomotion.demos import storage
 from geomotion.demos.demonstrations import Demonstrations, Trajectory
 from geomotion.errors import InvalidSetting
+from geomotion.export import OnnxPolicy
 from geomotion.figures.safety import save_safety_figures
 from geomotion.files import read_json
 from geomotion.models import ModelConfig, Skill
+from geomotion.safe_skills import nearest_body_m
 from geomotion.stages import safety_picture
+from geomotion.stages.export import ExportConfig, export
 from geomotion.stages.rollout import RolloutStageConfig, rollout
 from geomotion.stages.safety import certificate_part, judge_safety, safe
 from geomotion.tracking import Artefacts, StageRun
@@ -24,6 +27,14 @@ from geomotion.training.data import Geometry
 
 SAFETY = schema.RiemannianSafety(points_per_axis=40)
 BALL = schema.SphereObstacle(centre_m=[0.05, 0.002, 0.0], radius_m=0.006)
+
+
+class Unlogged(StageRun):
+    """One that logs nothing elsewhere."""
+
+    def log_series(self, *_) -> None: ...
+
+    def log_policy(self, *_) -> None: ...
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +123,22 @@ def test_presets_ask_for_a_region_with_an_obstacle_in_it(figure):
 def test_settings_out_of_range_are_refused(wrong):
     with pytest.raises(InvalidSetting):
         schema.RiemannianSafety(**wrong)
+
+
+@pytest.mark.usefixtures("without_shape_checks")
+def test_an_exported_policy_stays_in_the_region_that_it_was_given(inputs, skill, demonstrations, tmp_path):
+    (tmp_path / "export").mkdir()
+    run = Unlogged(tmp_path / "export", tmp_path / "checkpoint", client=None, run_id="1")
+    export(ExportConfig(schema.PolicyConfig(), safety=SAFETY, obstacle=BALL), inputs, run)
+    document = read_json(run.folder / "policy.json")
+    assert document["max_difference_to_torch"]["velocity_m_per_s"] < 1e-5
+    assert document["safety"]["rho"] == SAFETY.rho
+    policy, region = OnnxPolicy(run.folder / "policy.onnx"), safe(SAFETY, BALL, skill, demonstrations)
+    state, clearances = np.array([[0.09, 0.002, 0.0]], np.float32), []
+    for _ in range(250):
+        answer = policy({"state_m": state})
+        assert answer["safety_distance"] > SAFETY.rho
+        state = state + 0.01 * answer["velocity_m_per_s"]
+        clearances.append(nearest_body_m(region.bodies, state.astype(float))[0])
+    assert min(clearances) > 0
+    assert np.linalg.norm(state) < 5e-3

@@ -63,15 +63,18 @@ def test_every_loss_is_kept_and_the_model_can_be_read(ingested, run):
     assert torch.isfinite(skill.field(skill.goal)).all()
 
 
+PRIMITIVE = ModelConfig(schema.IdentityChart(), schema.MovementPrimitiveField(), schema.NoRegulariser(), 0)
 REFUSED = {
-    "training.curl_weight": (LINEAR, schema.VelocityTraining(curl_weight=0.1)),
-    "training": (LINE_INTEGRAL, schema.TrajectoryTraining()),
+    "training.curl_weight=": (LINEAR, schema.VelocityTraining(curl_weight=0.1)),
+    "training=": (LINE_INTEGRAL, schema.TrajectoryTraining()),
+    "training=velocity is not valid: expected closed_form": (PRIMITIVE, schema.VelocityTraining()),
+    "training=adjoint is not valid: expected closed_form": (PRIMITIVE, schema.AdjointTraining()),
 }
 
 
-@pytest.mark.parametrize("key", REFUSED)
-def test_an_objective_that_does_not_suit_the_field_is_refused(ingested, run, key):
-    model, training = REFUSED[key]
-    with pytest.raises(InvalidSetting, match=rf"^{key}="):
+@pytest.mark.parametrize("words", REFUSED)
+def test_an_objective_that_does_not_suit_the_field_is_refused(ingested, run, words):
+    model, training = REFUSED[words]
+    with pytest.raises(InvalidSetting, match=f"^{words}"):
         train(TrainConfig(LETTERS, model, training, 0), ingested, run)
     assert not list(run.folder.iterdir())

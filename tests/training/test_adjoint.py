@@ -1,6 +1,7 @@
 """Fitting through a solver: demonstrations that the field draws itself are at distance 0, and gradients are right."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -10,6 +11,8 @@ from torch.testing import assert_close
 from geomotion.config import AdjointTraining
 from geomotion.dynamics.charts import IdentityChart, ScalingChart
 from geomotion.dynamics.fields import ChartedField
+from geomotion.dynamics.linear import LinearField
+from geomotion.dynamics.time_law import SplineTimeLaw
 from geomotion.training.adjoint import TrajectoryShooting
 from geomotion.training.data import Geometry, TrainingSet
 
@@ -58,6 +61,30 @@ def test_the_adjoint_gradient_is_that_of_the_closed_form(data):
     step = 1e-2
     difference = (loss_of(1.0 + step, data)[0] - loss_of(1.0 - step, data)[0]) / (2 * step * DURATION_S)
     assert_close(model.field.rate.grad, difference.detach(), rtol=1e-2, atol=0)
+
+
+def test_a_time_law_counts_from_the_start_of_the_demonstration_and_is_fitted_as_well(data):
+    law = SplineTimeLaw(4, 0.2)
+    with torch.no_grad():
+        law.raw_speeds.copy_(torch.tensor([-1.0, 1.0, 2.0, 0.0, -2.0]))
+    model = ChartedField(ScalingChart(CENTRE, SCALE_M), LinearField(2, 0.5, 1.0), DURATION_S, law)
+    states = [model.solve(x[:1], t)[0].detach() for x, t in zip(data.states, data.times, strict=True)]
+    drawn = replace(data, states=tuple(states))
+    objective = TrajectoryShooting(drawn, Geometry.of(drawn), AdjointTraining(**TIGHT, piece=0.3))
+
+    def loss() -> torch.Tensor:
+        return objective(model, 0.0, torch.Generator().manual_seed(0))["trajectory"]
+
+    assert loss() < 1e-8
+    with torch.no_grad():
+        law.raw_speeds.add_(torch.tensor([0.0, 0.3, 0.0, 0.0, 0.0]))
+    loss().backward()
+    found, step = law.raw_speeds.grad[1].clone(), 1e-2
+    with torch.no_grad():
+        law.raw_speeds[1] += step
+        above = loss()
+        law.raw_speeds[1] -= 2 * step
+    assert_close(found, (above - loss()).detach() / (2 * step), rtol=2e-2, atol=0)
 
 
 def test_pieces_are_no_longer_than_the_shortest_demonstration(data):

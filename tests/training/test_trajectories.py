@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from geomotion.config import FlowChart, LearnedTimeLaw, LinearField, NoRegulariser, NoTimeLaw, TrajectoryTraining
+from geomotion.dynamics.start_memory import StartMemory
 from geomotion.models import ModelConfig, build
 from geomotion.training.data import Geometry, TrainingSet
 from geomotion.training.trajectories import TrajectoryReproduction, nearest_curves, squared_distance_to_curve
@@ -118,3 +119,27 @@ def test_haste_costs_nothing_where_it_has_no_weight(spirals):
     model = build(ModelConfig(FlowChart(layers=2), LinearField(), NoRegulariser(), 0), geometry).train()
     losses = TrajectoryReproduction(spirals, geometry, TrajectoryTraining(haste_weight=0.0))(model, 0.0, generator())
     assert "haste" not in losses
+
+
+def test_curves_are_compared_by_the_nearest_points_of_each_part(spirals):
+    """Parts that pass the same points in another order are alike, though no state of the one curve is on the other."""
+    geometry, settings = (
+        Geometry.of(spirals),
+        TrajectoryTraining(nearest_point_weight=0.0, nearest_point_mean_weight=1.0),
+    )
+    one = torch.rand(1, 64, 2, generator=generator())
+    other = torch.stack([one[..., 0], one[..., 1].flip(1)], -1)
+    whole, parts = (TrajectoryReproduction(spirals, geometry, settings, sizes) for sizes in (None, (1, 1)))
+    assert float(parts._nearest_point(one, other)) < 0.1 * float(whole._nearest_point(one, other))
+
+
+def test_without_their_offsets_demonstrations_begin_alike_and_end_where_they_did(spirals):
+    memory = StartMemory(2, fade_s=0.5 * min(float(times[-1]) for times in spirals.times))
+    starts = torch.stack([states[0] for states in spirals.states])
+    memory.learn(starts)
+    left = spirals.without_offsets(memory)
+    for times, states, velocities, shown in zip(left.times, left.states, left.velocities, spirals.states, strict=True):
+        torch.testing.assert_close(states[0], memory.mean_start)
+        torch.testing.assert_close(states[-1], shown[-1])
+        slope = torch.gradient(states, spacing=(times,), dim=0)[0]
+        torch.testing.assert_close(velocities[1:-1], slope[1:-1], rtol=0.05, atol=0.05 * float(slope.abs().max()))

@@ -25,6 +25,12 @@ WITH_DECAY = (
     " The coordinates of the skill are {skill_dim} of {dim}; the others decay at the rate k, so the Jacobian is "
     "block-diagonal and the field contracts in all dimensions, at the lesser of both rates."
 )
+WITH_MEMORY = (
+    " A motion remembers how far from the mean start it began, and carries this offset along, which fades out within "
+    "{fade_s:.3g} s. The claim is one of motions that remember the same start, as those of a pushed robot do, in the "
+    "metric at the state less the offset. Two undisturbed motions from different starts come together as the offset "
+    "fades, not at the rate."
+)
 NOT_A_JACOBIAN = (
     "The matrix field of Eq. (5.1) is negative definite, but it is in general not the Jacobian of the line integral of "
     "Eq. (5.2): its rows are not gradients. Contraction is therefore measured on the true Jacobian."
@@ -107,7 +113,7 @@ def certify(model: ChartedField, states: States) -> Certificate:
             Claim.by_construction if model.is_onto else Claim.by_construction_on_manifold,
             "M(x) = Dψ(x)ᵀDψ(x), the pullback of the Euclidean metric through the chart ψ",
             slowest_rate(model) / model.time_unit_s,
-            _proof(field) + _about_time(model) + place,
+            _proof(field) + _about_time(model) + _about_starts(model) + place,
             overshoot,
         )
     reason = NOT_A_JACOBIAN if isinstance(field, LineIntegralField) else getattr(field, "claim", UNCONSTRAINED)
@@ -150,6 +156,10 @@ def _about_time(model: ChartedField) -> str:
         f"rate accounts for this; over the mean duration of {model.time_unit_s:.3g} s distances fall by "
         f"e^-{decay_over_duration(model):.3g}."
     )
+
+
+def _about_starts(model: ChartedField) -> str:
+    return "" if model.start_memory is None else WITH_MEMORY.format(fade_s=float(model.start_memory.fade_s))
 
 
 def chart_distortion(model: ChartedField, states: States) -> Overshoot:

@@ -16,7 +16,16 @@ import torch
 from torch import nn
 
 from geomotion.dynamics.conditional_linear import ConditionalLinear
-from geomotion.dynamics.fields import Chart, ChartedField, PushForward, SolvableField, VectorField
+from geomotion.dynamics.fields import (
+    Chart,
+    ChartedField,
+    PushForward,
+    SkillField,
+    SolvableField,
+    SolvableSkillField,
+    VectorField,
+    has_closed_form,
+)
 from geomotion.dynamics.line_integral import LineIntegralField
 from geomotion.dynamics.regularisers import Regulariser, StateDependentRegulariser
 from geomotion.dynamics.time_law import ConditionalTimeLaw
@@ -29,13 +38,25 @@ class Standing(nn.Module):
     Args:
         field: f.
         context: Number of coordinates that stand still.
+
+    Attributes:
+        skill_dim: Coordinates of the skill, of an embedded field alone.
     """
+
+    skill_dim: int
 
     def __init__(self, field: VectorField, context: int) -> None:
         super().__init__()
         self.field = field
         self.context = context
         self.dim = field.dim + context
+        if isinstance(field, SkillField):
+            self.skill_dim = field.skill_dim
+
+    @property
+    def is_solvable(self) -> bool:
+        """Whether f has trajectories in closed form."""
+        return has_closed_form(self.field)
 
     def given(self, condition: Float[Tensor, " K"]) -> VectorField:
         """f, the same for every condition."""
@@ -45,11 +66,20 @@ class Standing(nn.Module):
         z, condition = x[..., : -self.context], x[..., -self.context :]
         return torch.cat([self.field(z), torch.zeros_like(condition)], -1)
 
-    def solve(self, start: State, times: Float[Tensor, "*#batch time"]) -> Trajectories:
-        """Trajectories; only where the field has them in closed form."""
-        assert isinstance(self.field, SolvableField)
+    def solve(
+        self,
+        start: State,
+        times: Float[Tensor, "*#batch time"],
+        transverse_times: Float[Tensor, "*#batch time"] | None = None,
+    ) -> Trajectories:
+        """Trajectories; only where the field has them in closed form, and a clock for z_e where it has z_e."""
         z, condition = start[..., : -self.context], start[..., -self.context :]
-        moving = self.field.solve(z, times)
+        if transverse_times is None:
+            assert isinstance(self.field, SolvableField)
+            moving = self.field.solve(z, times)
+        else:
+            assert isinstance(self.field, SolvableSkillField)
+            moving = self.field.solve(z, times, transverse_times)
         return torch.cat([moving, condition[..., None, :].expand(*moving.shape[:-1], -1)], -1)
 
 
@@ -195,4 +225,5 @@ def given(
     assert isinstance(latent, Standing | ConditionalLinear | ConditionalLineIntegral)
     if isinstance(law, ConditionalTimeLaw):
         law = law.given(chart.latent_condition)
-    return ChartedField(chart, latent.given(chart.latent_condition), slowdown * field.time_unit_s, law)
+    within = latent.given(chart.latent_condition)
+    return ChartedField(chart, within, slowdown * field.time_unit_s, law, field.transverse_law)

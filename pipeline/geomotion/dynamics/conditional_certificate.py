@@ -7,10 +7,10 @@ from geomotion.dynamics.certificate import Certificate, Claim, Overshoot
 
 EVERY_CONDITION = (
     " The same holds under every condition, shown or not, in a metric of its own, at a rate that is, per duration of "
-    "its motions, at least field.min_rate_per_duration (field.transverse_rate_per_duration, if that is less and "
-    "field.skill_dim is set) times the smallest speed of a time law. The rate given here is that of the slowest "
-    "demonstrated condition. A change of condition on the way changes the metric once; from then on distances fall at "
-    "the rate of the new one."
+    "its motions, at least field.min_rate_per_duration times the smallest speed of a time law "
+    "(field.transverse_rate_per_duration times field.transverse_start, if that is less and field.skill_dim is set). "
+    "The rate given here is that of the slowest demonstrated condition. A change of condition on the way changes the "
+    "metric once; from then on distances fall at the rate of the new one."
 )
 
 

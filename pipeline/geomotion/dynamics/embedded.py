@@ -3,7 +3,7 @@
 import torch
 from torch import nn
 
-from geomotion.dynamics.fields import SolvableField
+from geomotion.dynamics.fields import SolvableField, has_closed_form
 from geomotion.dynamics.linear import LinearField
 from geomotion.dynamics.potential import PotentialField
 from geomotion.types import Float, State, Tensor, Trajectories, Velocity
@@ -36,6 +36,11 @@ class EmbeddedField(nn.Module):
     def rate(self) -> float:
         """Contraction rate, per time unit."""
         return min(self.field.rate, float(self.transverse_rate))
+
+    @property
+    def is_solvable(self) -> bool:
+        """Whether f has trajectories in closed form."""
+        return has_closed_form(self.field)
 
     def project(self, z: State) -> State:
         """The same skill coordinates on the manifold where all others vanish."""

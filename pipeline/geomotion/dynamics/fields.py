@@ -6,6 +6,7 @@ from typing import Protocol, runtime_checkable
 import torch
 from torch import nn
 
+from geomotion.dynamics.start_memory import CarriedOffset, StartMemory
 from geomotion.dynamics.time_law import Clock, ConditionalTimeLaw, LaterTimeLaw, TimeLaw
 from geomotion.types import Float, Latent, State, Tensor, Trajectories, Velocity
 
@@ -30,6 +31,14 @@ class SolvableField(VectorField, Protocol):
     def solve(self, start: State, times: Float[Tensor, "*#batch time"]) -> Trajectories:
         """States at the given times after the start, which may be the same for all or each one's own."""
         ...
+
+
+def has_closed_form(field: VectorField) -> bool:
+    """Whether trajectories of a field are known in closed form.
+
+    One that wraps another has `solve` whether or not the inner one does, and says so by ``is_solvable``.
+    """
+    return bool(getattr(field, "is_solvable", isinstance(field, SolvableField)))
 
 
 @runtime_checkable
@@ -117,6 +126,8 @@ class ChartedField(nn.Module):
         time_law: θ, which may depend on the condition that states carry; without one, θ̇ = 1.
         transverse_law: The clock of the coordinates beyond those of the skill, where `field` is an embedded one; None:
             θ is theirs as well.
+        start_memory: What :meth:`begun` makes of starts; None: they are states like any other.
+        carried: s(t) δ of motions whose starts are known, for which ẋ = f(x - s δ, t) + ṡ δ; None: of none.
     """
 
     def __init__(
@@ -126,6 +137,8 @@ class ChartedField(nn.Module):
         time_unit_s: float,
         time_law: TimeLaw | ConditionalTimeLaw | None = None,
         transverse_law: TimeLaw | None = None,
+        start_memory: StartMemory | None = None,
+        carried: CarriedOffset | None = None,
     ) -> None:
         super().__init__()
         self.chart = chart
@@ -133,15 +146,21 @@ class ChartedField(nn.Module):
         self.time_unit_s = time_unit_s
         self.time_law = time_law
         self.transverse_law = transverse_law
+        self.start_memory = start_memory
+        self.carried = carried
         self.dim = chart.dim
 
     def forward(self, x: State, elapsed_s: Float[Tensor, "*#batch 1"] | None = None) -> Velocity:
-        """ẋ at a time since the start of the motion [s]; without one, at θ̇ = 1."""
+        """ẋ at a time since the start of the motion [s]; without one, at θ̇ = 1 and of no start."""
+        if self.carried is not None and elapsed_s is not None:
+            x = x - self.carried.at(elapsed_s)
         z, push_forward = self.chart.linearise(x)
         latent = self.field(z)
         if elapsed_s is not None:
             latent = self.paced(latent, elapsed_s / self.time_unit_s, self.law_at(z))
         velocity: Velocity = push_forward(latent) / self.time_unit_s
+        if self.carried is not None and elapsed_s is not None:
+            velocity = velocity + self.carried.velocity(elapsed_s)
         return velocity
 
     def velocity(self, x: State, elapsed_s: Float[Tensor, "*#batch 1"]) -> Velocity:
@@ -200,15 +219,41 @@ class ChartedField(nn.Module):
         """A lower bound of θ̇."""
         return 1.0 if self.time_law is None else self.time_law.slowest()
 
+    def begun(self, starts: State) -> "ChartedField":
+        """The field of motions from these starts, which have a memory of them if :attr:`start_memory` says so."""
+        if self.start_memory is None or self.carried is not None:
+            return self
+        clocks = self.time_unit_s, self.time_law, self.transverse_law
+        carried = self.start_memory.carried(starts)
+        return ChartedField(self.chart, self.field, *clocks, carried=carried).train(self.training)
+
+    @torch.no_grad()
+    def begin_on_skill(self) -> None:
+        """Move the mean start to where z_e vanishes: then only what disturbs a motion is beside the skill."""
+        memory, field = self.start_memory, self.field
+        assert memory is not None and isinstance(field, SkillField)
+        z = self.chart.to_latent(memory.mean_start)
+        z[field.skill_dim :] = 0
+        memory.mean_start.copy_(self.chart.to_ambient(z))
+
+    def forgetful(self) -> "ChartedField":
+        """The same field without a memory of starts."""
+        if self.start_memory is None and self.carried is None:
+            return self
+        clocks = self.time_unit_s, self.time_law, self.transverse_law
+        return ChartedField(self.chart, self.field, *clocks).train(self.training)
+
     def later(self, begin_s: float) -> "ChartedField":
-        """The same field for a motion that has run for some time already [s]."""
+        """The same field for a motion that has run for some time already [s], from the mean start unless begun."""
         if self.time_law is None:
             return self
         assert isinstance(self.time_law, TimeLaw)  # of one condition
         begin = begin_s / self.time_unit_s
         transverse = None if self.transverse_law is None else LaterTimeLaw(self.transverse_law, begin)
         law = LaterTimeLaw(self.time_law, begin)
-        return ChartedField(self.chart, self.field, self.time_unit_s, law, transverse).train(self.training)
+        carried = None if self.carried is None else self.carried.later(begin_s)
+        clocks = self.time_unit_s, law, transverse
+        return ChartedField(self.chart, self.field, *clocks, carried=carried).train(self.training)
 
     @property
     def is_onto(self) -> bool:
@@ -218,15 +263,17 @@ class ChartedField(nn.Module):
     @property
     def is_solvable(self) -> bool:
         """Whether trajectories are known in closed form."""
-        return isinstance(self.field, SolvableField) and self.is_onto
+        return has_closed_form(self.field) and self.is_onto
 
     def solve(self, start: State, times: Float[Tensor, "*#batch time"]) -> Trajectories:
         """ψ⁻¹ of the latent trajectory, at times after the start [s]; only where :attr:`is_solvable`."""
-        assert isinstance(self.field, SolvableField)
-        z, times = self.chart.to_latent(start), times / self.time_unit_s
+        if self.carried is not None:
+            start = start - self.carried.at(times.new_zeros(1))
+        z, passed = self.chart.to_latent(start), times / self.time_unit_s
         if isinstance(self.time_law, ConditionalTimeLaw):
-            times = times.expand(*z.shape[:-1], -1)  # each start has a law of its own
-        return self.chart.to_ambient(self.flow(z, times, self.law_at(z)))
+            passed = passed.expand(*z.shape[:-1], -1)  # each start has a law of its own
+        states = self.chart.to_ambient(self.flow(z, passed, self.law_at(z)))
+        return states if self.carried is None else states + self.carried.along(times)
 
 
 class TimedField(nn.Module):

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import torch
 from torchdiffeq import odeint
 
-from geomotion.dynamics.fields import ChartedField, Plan, SolvableField, TimedField, VectorField
+from geomotion.dynamics.fields import ChartedField, Plan, TimedField, VectorField, has_closed_form
 from geomotion.errors import InvalidSetting
 from geomotion.types import Float, State, Tensor, Times, Trajectories
 
@@ -63,7 +63,7 @@ def rollout(
 
     Args:
         field: The field; one that changes with time begins at ``times[0]``.
-        starts: States at ``times[0]``.
+        starts: States at ``times[0]``; a field that remembers starts remembers these.
         times: Output times [s], increasing.
         method: ``auto`` takes the closed form where there is one and ``rk4`` otherwise. ``dopri5`` falls back to
             ``rk4``, with a note in the result, where its step size collapses.
@@ -77,6 +77,7 @@ def rollout(
     Raises:
         InvalidSetting: If a closed form is asked for and there is none.
     """
+    field = _begun(field, starts)
     method = _resolve(field, method)
     note = ""
     if method == "closed_form":
@@ -135,9 +136,12 @@ class _StepSizeCollapsed(Exception):
     """The adaptive solver gave up."""
 
 
+def _begun(field: VectorField, starts: State) -> VectorField:
+    return field.begun(starts) if isinstance(field, ChartedField) else field
+
+
 def _resolve(field: VectorField, method: Method) -> Method:
-    # A field that wraps another has `solve` whether or not the inner one does, and says so by `is_solvable`.
-    solvable = bool(getattr(field, "is_solvable", isinstance(field, SolvableField)))
+    solvable = has_closed_form(field)
     if method == "auto":
         return "closed_form" if solvable else "rk4"
     if method == "closed_form" and not solvable:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -20,6 +20,20 @@ DECADES = 2.0  # of S and of the volume around their levels that greys tell apar
 STREAMS = 0.9
 NodeValues = Float[np.ndarray, "n n"]
 Rollouts = Float[np.ndarray, "start time 2"]
+
+
+@runtime_checkable
+class RegionMap(Protocol):
+    """What there is to see of a region alone; see :class:`SafetyPicture`."""
+
+    @property
+    def axes(self) -> Float[np.ndarray, "2 n"]: ...
+    @property
+    def distance(self) -> NodeValues: ...
+    @property
+    def levels(self) -> Float[np.ndarray, " 3"]: ...
+    @property
+    def is_inside(self) -> Bool[np.ndarray, "n n"]: ...
 
 
 @dataclass(frozen=True)
@@ -145,7 +159,7 @@ def figure_safe_motion(picture: SafetyPicture) -> Figure:
     return figure
 
 
-def draw_region(figure: Figure, ax: Axes, picture: SafetyPicture, has_bar: bool = True) -> None:
+def draw_region(figure: Figure, ax: Axes, picture: RegionMap, has_bar: bool = True) -> None:
     """Grey over log S, dark where it is unsafe, with lines at ρ and ν, and obstacles outlined."""
     rho, nu, _ = np.log10(picture.levels)
     values = np.log10(picture.distance)
@@ -173,7 +187,7 @@ def save_safety_figures(picture: SafetyPicture, folder: Path) -> None:
 def _shade(
     figure: Figure,
     ax: Axes,
-    picture: SafetyPicture,
+    picture: RegionMap,
     values: NodeValues,
     limits: tuple[float, float],
     label: str | None,

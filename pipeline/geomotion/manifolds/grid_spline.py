@@ -58,7 +58,7 @@ class GridSpline(nn.Module):
     def forward(self, points: Points) -> tuple[Float[Tensor, "*batch k"], Float[Tensor, "*batch k 2"]]:
         """Values and gradients; across the border, the gradient vanishes."""
         place = ((points - self.low) / self.cell).clamp(0, self.last)
-        corner = place.detach().floor().clamp(max=self.last - 1)
+        corner = place.detach().nan_to_num().floor().clamp(max=self.last - 1)  # what is no number is in no cell
         share = place - corner
         powers = torch.stack([torch.ones_like(share), share, share * share, share * share * share], dim=-1)
         rows, columns = (powers @ self.basis).unflatten(-1, (2, 4)).unbind(-3)  # type: ignore[no-untyped-call]

@@ -7,6 +7,7 @@ Source: He, Zhang, Ren, Sun (2016), Deep residual learning for image recognition
 """
 
 import hashlib
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +111,17 @@ def _stored(weights: str) -> Any:
     if lacking := [*loaded["missing_keys"], *(str(name) for name, *_ in loaded["mismatched_keys"])]:
         raise InvalidSetting("encoder.weights", weights, f"{expected}; these lack {', '.join(sorted(lacking)[:3])}")
     return network
+
+
+@cache
+def digest_of_weights(weights: str) -> str:
+    """SHA-256 of the parameters of stored weights, read once in a process.
+
+    Raises:
+        MissingData: As of :class:`ImageEncoder`.
+        InvalidSetting: Likewise.
+    """
+    return ImageEncoder(weights).digest
 
 
 def _digest(network: nn.Module) -> str:

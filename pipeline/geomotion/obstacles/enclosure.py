@@ -13,7 +13,7 @@ def enclose(
 
     Args:
         boundary: The surface.
-        rounding: By how much a convex body grows [m]; a tenth of its inradius if omitted.
+        rounding: By how much the body grows [m]; a tenth of its inradius if omitted and it is convex.
         convex_hull: Whether the convex hull is avoided in any case.
         velocity: Shape (D,) [m/s].
 
@@ -22,4 +22,4 @@ def enclose(
     """
     if convex_hull or boundary.is_convex:
         return Polytope(boundary.vertices, rounding, velocity)
-    return StarShape(boundary, velocity)
+    return StarShape(boundary, velocity, rounding or 0.0)

@@ -9,7 +9,9 @@ goal.
 Source: Thesis Sec. 6.3, Eq. (6.5)-(6.9); Huber, Slotine, Billard (2022).
 """
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import torch
 from torch import nn
@@ -17,11 +19,12 @@ from torch import nn
 from geomotion.dynamics.fields import VectorField
 from geomotion.errors import ShapeMismatch
 from geomotion.obstacles.safety_region import SafetyRegion, Sight
-from geomotion.types import Float, State, Tensor, Times, Trajectories, Velocity
+from geomotion.types import Bool, Float, State, Tensor, Times, Trajectories, Velocity
 
 PLANE = 2
 STRIDE = 0.5  # of a cell of the region's grid
-MAX_HALVINGS = 8
+MAX_HALVINGS, FEWER_HALVINGS = 8, 3
+FREE_STEPS, MEAN_STEPS = 5000, 40  # the latter for each output time, all halves counted; a trained skill takes fewer
 PROGRESS = 0.2  # share of the speed of f at which a motion near the border is helped on along its way
 HEAD_ON = 0.1  # share of the speed of f that has to point out of the region before a motion is helped fully
 CLEAR_PREFERENCE = 0.05  # of the way onward that is tangential: from here on, g has its full length
@@ -49,7 +52,8 @@ class SafeField(nn.Module):
         region: Where they may be.
         onward: The direction that the tangential field g of Eq. (6.9) is chosen by, from what a point sees; None for
             β = 0.
-        recovery_time: How long a start outside of the region takes to come in, per time unit of f.
+        recovery_time: How long a start outside of the region takes to come in, in time units of f.
+        fastest_return: How fast it does, at most.
 
     Raises:
         ShapeMismatch: If the field has fewer than two coordinates.
@@ -61,30 +65,31 @@ class SafeField(nn.Module):
         region: SafetyRegion,
         onward: Onward | None = along_geodesic,
         recovery_time: float = 0.02,
+        fastest_return: float = math.inf,
     ) -> None:
         super().__init__()
         if field.dim < PLANE:
             raise ShapeMismatch("coordinates of a field with a safety region", "2 or more", field.dim)
         self.field, self.region, self.dim, self.skill_dim = field, region, field.dim, PLANE
-        self.onward, self.recovery_time = onward, recovery_time
+        self.onward, self.recovery_time, self.fastest_return = onward, recovery_time, fastest_return
 
     def forward(self, z: State) -> Velocity:
         wanted = self.field(z)
-        kept = self.steered(self.region.sight(z[..., :PLANE]), wanted[..., :PLANE])
+        kept = self.steered(z[..., :PLANE], wanted[..., :PLANE])
         return torch.cat([kept, wanted[..., PLANE:]], dim=-1)
 
-    def steered(self, sight: Sight, wanted: Planar) -> Planar:
-        """f̂ from f, where points are as seen from the border.
+    def steered(self, points: Planar, wanted: Planar) -> Planar:
+        """f̂ from f at latent points.
 
-        What points away from the border is not slowed. Outside of the region, the motion of f fades, and the nearest
+        What points away from the border is not slowed. Outside of the region, the motion of f ends, and the nearest
         way in takes its place.
         """
+        sight = self.region.sight(points)
         velocity = self._modulated(sight, wanted)
         if self.onward is not None:
             velocity = velocity + self._help(sight, wanted, velocity)
-        inwards = sight.depth / self.recovery_time * sight.normal
-        faded = (sight.distance / self.region.levels.guarded).clamp(max=1)
-        return faded * velocity + inwards
+        inwards = (sight.depth / self.recovery_time).clamp(max=self.fastest_return) * sight.inward
+        return (1 - sight.outside) * velocity + inwards
 
     @staticmethod
     def _modulated(sight: Sight, velocity: Planar) -> Planar:
@@ -118,7 +123,9 @@ def follow_safely(field: SafeField, starts: Float[Tensor, "start D"], times: Tim
 
     A solution never leaves the region; a step may, by its error. One that does, or that is longer than `STRIDE` and
     might jump over what is unsafe, is halved, for the trajectories concerned only. Where it cannot be halved any more,
-    the motion waits for that long.
+    the motion goes on as far as that is safe, and waits there until the next output time. Fields so wild that this
+    happens everywhere would take forever: after the first `FREE_STEPS`, no more than `MEAN_STEPS` for each output time
+    are made on average.
 
     Args:
         field: What to follow.
@@ -126,30 +133,63 @@ def follow_safely(field: SafeField, starts: Float[Tensor, "start D"], times: Tim
         times: Output times, increasing, in time units of the field.
 
     Returns:
-        States, shape (start, time, D), and how many steps were waited.
+        States, shape (start, time, D), and in how many steps between output times, over all starts, motions waited.
     """
-    states, waited = [starts], 0
-    for step in times.diff().to(starts):
-        end, more = _advance(field, states[-1], step, MAX_HALVINGS)
+    states, waited, steps = [starts], 0, _Steps(field)
+    for number, step in enumerate(times.diff().to(starts), start=1):
+        is_within_means = steps.made <= FREE_STEPS + MEAN_STEPS * number
+        end, waits = steps.advance(states[-1], step, MAX_HALVINGS if is_within_means else FEWER_HALVINGS)
         states.append(end)
-        waited += more
+        waited += int(waits.sum())
     return torch.stack(states, dim=1), waited
 
 
-def _advance(field: SafeField, z: State, step: Float[Tensor, ""], halvings: int) -> tuple[State, int]:
-    end = _runge_kutta(field, z, step)
-    region, before, after = field.region, z[:, :PLANE], end[:, :PLANE]
+@dataclass
+class _Steps:
+    """Steps along a field.
+
+    Attributes:
+        field: What to follow.
+        made: How many, of all trajectories at once or of some of them.
+    """
+
+    field: SafeField
+    made: int = 0
+
+    def advance(self, z: State, step: Float[Tensor, ""], halvings: int) -> tuple[State, Bool[Tensor, " start"]]:
+        """States one step later, and which of them wait for the rest of it."""
+        self.made += 1
+        end = _runge_kutta(self.field, z, step)
+        refused = _refused(self.field.region, z, end)
+        if halvings == 0:
+            end[refused] = _as_far_as_safe(self.field.region, z[refused], end[refused])
+            return end, refused
+        waits = torch.zeros_like(refused)
+        if bool(refused.any()):
+            middle, waits_early = self.advance(z[refused], step / 2, halvings - 1)
+            later, waits_late = self.advance(middle[~waits_early], step / 2, halvings - 1)
+            waits[refused] = waits_early.masked_scatter(~waits_early, waits_late)
+            end[refused] = middle.index_put((~waits_early,), later)
+        return end, waits
+
+
+def _refused(region: SafetyRegion, z: State, end: State) -> Bool[Tensor, " start"]:
+    before, after = z[:, :PLANE], end[:, :PLANE]
     strays = region.is_safe(before) & ~region.is_safe(after)
-    strides = ((after - before).abs() > STRIDE * region.maps.cell).any(dim=1)
-    refused = strays | strides if halvings > 0 else strays
-    if not bool(refused.any()):
-        return end, 0
-    if halvings == 0:
-        end[strays] = z[strays]
-        return end, int(strays.sum())
-    middle, waited = _advance(field, z[refused], step / 2, halvings - 1)
-    end[refused], more = _advance(field, middle, step / 2, halvings - 1)
-    return end, waited + more
+    return strays | (_cells(region, after - before) > STRIDE)
+
+
+def _as_far_as_safe(region: SafetyRegion, z: State, end: State) -> State:
+    """Along a step up to `STRIDE`; not at all where that is outside, or the step leads nowhere."""
+    share = (STRIDE / _cells(region, (end - z)[:, :PLANE])).clamp(max=1)[:, None]
+    shortened = z + share * (end - z)
+    is_known = shortened.isfinite().all(dim=1)
+    strays = region.is_safe(z[:, :PLANE]) & ~region.is_safe(shortened[:, :PLANE])
+    return torch.where((is_known & ~strays)[:, None], shortened, z)
+
+
+def _cells(region: SafetyRegion, moved: Planar) -> Float[Tensor, " start"]:
+    return (moved.abs() / region.maps.cell).amax(dim=1)
 
 
 def _runge_kutta(field: VectorField, z: State, step: Float[Tensor, ""]) -> State:

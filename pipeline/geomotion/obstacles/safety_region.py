@@ -32,6 +32,7 @@ from geomotion.types import Float, Tensor
 SHARPNESS = 4  # of the minimum over reasons to stay away
 GUARD = 0.01  # of ρ, by which a motion stops before it: room for the error of a step
 NARROWEST = 1.1  # ν over where a motion stops, at least
+CLEARLY_OUT = 1.05  # ρ over S, from which on there is nothing but the way in, which does not depend on ∇S
 DIRECTION_FLOOR = 1e-12  # a shorter gradient has no direction
 
 Points = Float[Tensor, "*batch 2"]
@@ -168,14 +169,18 @@ class Sight:
         distance: S.
         freedom: λ_n, zero where a motion stops and one from ν on; λ_τ is 2 - λ_n.
         normal: n = ∇S/‖∇S‖, away from what is unsafe.
-        depth: How far it is to where a motion stops from a point beyond that, to first order; otherwise zero.
+        outside: Zero where S ≥ ρ, one from `CLEARLY_OUT` below it on.
+        depth: How far it is to where a motion stops from a point beyond that; otherwise zero.
+        inward: The direction of that way.
         onward: Direction in which the way to the goal shrinks fastest; zero where there is none.
     """
 
     distance: Values
     freedom: Values
     normal: Points
+    outside: Values
     depth: Values
+    inward: Points
     onward: Points
 
 
@@ -192,6 +197,8 @@ class SafetyRegion(nn.Module):
         InvalidSetting: If a node on the grid's border is safe.
     """
 
+    steps_out: Tensor
+
     def __init__(self, grid: LatentGrid, distance: NodeValues, way_to_goal: NodeValues, levels: Levels) -> None:
         super().__init__()
         border = np.ones(grid.shape, dtype=bool)
@@ -200,37 +207,53 @@ class SafetyRegion(nn.Module):
             expected = "less, so that what is safe ends before the border of the latent grid does"
             raise InvalidSetting("safety.nu", levels.inactive, expected)
         self.levels = levels
-        self.maps = GridSpline(grid, np.stack([-np.log(distance), _everywhere(grid, way_to_goal)], axis=1))
+        columns = [-np.log(distance), _everywhere(grid, way_to_goal), _cells_out(grid, way_to_goal)]
+        self.maps = GridSpline(grid, np.stack(columns, axis=1))
+        self.register_buffer("steps_out", torch.tensor([1.0, 0.0, 1.0], dtype=torch.float64))
 
     def distance(self, points: Points) -> Float[Tensor, "*batch"]:
         """S."""
-        return (-self._closeness(points)[0]).exp()
+        return (-self._seen(points)[0][..., 0]).exp()
 
     def is_safe(self, points: Points) -> Bool[Tensor, "*batch"]:
         """Whether S > ρ."""
         return self.distance(points) > self.levels.impenetrable
 
     def sight(self, points: Points) -> Sight:
-        """Distance, normal, depth and the way onward."""
-        closeness, slope, way = self._closeness(points)
-        distance = (-closeness).exp()[..., None]
-        steepness = slope.norm(dim=-1, keepdim=True).clamp(min=DIRECTION_FLOOR)
-        beyond = closeness[..., None] + math.log(self.levels.guarded)
+        """What points see of the border.
+
+        At the border, the way in is along ∇S. Farther out, or deep in an obstacle, S is flat or has maxima of its own;
+        the way is then to the nearest node from which the goal can be reached.
+        """
+        values, slopes = self._seen(points)
+        closeness, cells = values[..., :1], values[..., 2:].clamp(min=0)
+        distance = (-closeness).exp()
+        steepness = slopes[..., 0, :].norm(dim=-1, keepdim=True).clamp(min=DIRECTION_FLOOR)
+        normal = -slopes[..., 0, :] / steepness
+        by_slope = (closeness + math.log(self.levels.guarded)).clamp(min=0) / steepness
+        to_node = -self.maps.cell.square() * slopes[..., 2, :]
+        outside = ((closeness + math.log(self.levels.impenetrable)) / math.log(CLEARLY_OUT)).clamp(0, 1)
         return Sight(
             distance,
             self.levels.switched(distance, 0.0, 1.0),
-            -slope / steepness,
-            beyond.clamp(min=0) / steepness,
-            -way / way.norm(dim=-1, keepdim=True).clamp(min=DIRECTION_FLOOR),
+            normal,
+            outside,
+            torch.minimum(by_slope, (cells + 1) * self.maps.cell.norm()),
+            (1 - outside) * normal + outside * _unit(to_node),
+            -_unit(slopes[..., 1, :]),
         )
 
-    def _closeness(self, points: Points) -> tuple[Float[Tensor, "*batch"], Points, Points]:
-        """log 1/S and its gradient, also outside of the grid, and the gradient of the way to the goal."""
+    def _seen(self, points: Points) -> tuple[Float[Tensor, "*batch 3"], Float[Tensor, "*batch 3 2"]]:
+        """log 1/S, the way to the goal, and cells to the nearest node that has one, also outside of the grid."""
         values, gradients = self.maps(points)
         beyond = (points - self.maps.nearest(points)) / self.maps.cell
-        cells = beyond.norm(dim=-1)
-        outward = beyond / cells.clamp(min=DIRECTION_FLOOR)[..., None] / self.maps.cell
-        return values[..., 0] + cells, gradients[..., 0, :] + outward, gradients[..., 1, :]
+        outward = beyond.norm(dim=-1, keepdim=True) * self.steps_out, _unit(beyond)[..., None, :] / self.maps.cell
+        return values + outward[0], gradients + self.steps_out[:, None] * outward[1]
+
+
+def _unit(vectors: Points) -> Points:
+    units: Tensor = vectors / vectors.norm(dim=-1, keepdim=True).clamp(min=DIRECTION_FLOOR)
+    return units
 
 
 def _everywhere(grid: LatentGrid, way: NodeValues) -> NodeValues:
@@ -240,3 +263,9 @@ def _everywhere(grid: LatentGrid, way: NodeValues) -> NodeValues:
     known = way.reshape(grid.shape)[tuple(nearest)]
     per_cell = known[is_open].max() / max(grid.shape)
     return np.asarray(gaussian_filter(known + per_cell * cells, sigma=1.0, mode="nearest").ravel())
+
+
+def _cells_out(grid: LatentGrid, way: NodeValues) -> NodeValues:
+    """How many cells away the nearest node with a way to the goal is, smoothed over a cell."""
+    cells = distance_transform_edt(~np.isfinite(way).reshape(grid.shape))
+    return np.asarray(gaussian_filter(cells, sigma=1.0, mode="nearest").ravel())

@@ -13,6 +13,8 @@ from geomotion.types import Float, Int, State, Tensor
 
 CELLS = {2: 32, 3: 24}  # steps of the grid of log radii, along the radius of the unit sphere
 ANGLE = {2: 1 / 500, 3: 1 / 100}  # between samples of the surface [rad]
+GROWN_ANGLE = {2: 1 / 200, 3: 1 / 30}  # the same of a body that is grown, for which each one is held against all others
+AT_ONCE = 1000  # samples
 MARGIN = 4  # steps of the grid beyond the cube around the sphere
 VISIBLE = 1e-4  # of the size: a kernel less deep is a point that rounding decides about
 
@@ -37,9 +39,10 @@ class StarShape(Solid):
     Args:
         boundary: The surface of the body.
         velocity: Shape (D,) [m/s].
+        grown_by: What is nearer to the body than this counts as a part of it [m].
 
     Attributes:
-        growth: Largest ratio of avoided to given radius, less one.
+        growth: Largest ratio of avoided to given (and grown) radius, less one.
 
     Raises:
         InvalidSetting: If the body is not star-shaped.
@@ -47,7 +50,7 @@ class StarShape(Solid):
 
     coefficients: Tensor
 
-    def __init__(self, boundary: Boundary, velocity: Tensor | None = None) -> None:
+    def __init__(self, boundary: Boundary, velocity: Tensor | None = None, grown_by: float = 0.0) -> None:
         centre, depth = deepest_point(boundary.normals, boundary.offsets)
         if not depth > VISIBLE * float(np.ptp(boundary.vertices, axis=0).max()):
             raise InvalidSetting(
@@ -58,21 +61,25 @@ class StarShape(Solid):
             )
         super().__init__(torch.from_numpy(centre), velocity=velocity)
         self.step = 1 / CELLS[self.dim]
-        offsets, faces = boundary.samples(centre, ANGLE[self.dim])
+        angle = (GROWN_ANGLE if grown_by > 0 else ANGLE)[self.dim]
+        offsets, faces = boundary.samples(centre, angle)
         offsets = offsets - centre
         radii = np.linalg.norm(offsets, axis=1)
         directions = torch.from_numpy(offsets / radii[:, None])
         heights = (boundary.offsets - boundary.normals @ centre)[faces]
+        if grown_by > 0:
+            # grown, it is star-shaped about every point of the ball in its kernel, grown as well
+            radii, heights = _grown_radii(offsets, grown_by + angle * radii), np.full_like(radii, depth + grown_by)
         slopes = np.sqrt(np.maximum((radii / heights) ** 2 - 1, 0))
         self.register_buffer("coefficients", self._interpolate(directions, np.log(radii)))
         lacking = np.log(radii) - self._log_radius(directions).numpy()
-        self._raise(directions, lacking + 2 * slopes * ANGLE[self.dim])
+        self._raise(directions, lacking + 2 * slopes * angle)
         smooth = self._log_radius(directions).exp().numpy()
         self.growth = float((smooth / radii).max()) - 1
         steepest = self._slope_bound()
         self.steepness = float(np.hypot(1, steepest))
         self.inradius = float(radii.min())
-        self.bounding_radius = float(smooth.max() * np.exp(steepest * ANGLE[self.dim]))
+        self.bounding_radius = float(smooth.max() * np.exp(steepest * angle))
 
     def level(self, x: State) -> Float[Tensor, "*batch"]:
         body = self.to_body(x)
@@ -154,6 +161,20 @@ class StarShape(Solid):
             for axis in range(self.dim)
         ]
         return float(np.linalg.norm([np.abs(differences[used]).max() / self.step for differences, used in both]))
+
+
+def _grown_radii(
+    offsets: Float[np.ndarray, "sample D"], by: Float[np.ndarray, " sample"]
+) -> Float[np.ndarray, " sample"]:
+    """How far rays through samples are in balls around any of them, whose radii are given."""
+    directions = offsets / np.linalg.norm(offsets, axis=1, keepdims=True)
+    beyond = np.square(by) - np.square(offsets).sum(axis=1)
+    found = []
+    for some in np.split(directions, range(AT_ONCE, len(directions), AT_ONCE)):
+        along = some @ offsets.T
+        inside = np.square(along) + beyond
+        found.append(np.where(inside >= 0, along + np.sqrt(inside.clip(min=0)), 0.0).max(axis=1))
+    return np.concatenate(found)
 
 
 def _pairs(mask: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,8 @@
 """What a control loop asks: a velocity for what it measures, and whether it can be trusted."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
+from dataclasses import replace
 
 import torch
 from torch import nn
@@ -13,6 +14,7 @@ from geomotion.dynamics.conditional import Standing
 from geomotion.dynamics.embedded import EmbeddedField
 from geomotion.dynamics.injective import DecoderChart
 from geomotion.models import Skill
+from geomotion.obstacles.safe_field import PLANE, SafeField
 from geomotion.policy import ports
 from geomotion.policy.ports import Input, Output, Status
 from geomotion.policy.sphere import Avoidance, TensorSphere
@@ -23,11 +25,12 @@ ROTATION_TOLERANCE = 0.1  # of a quaternion's length; measured ones are shortene
 
 
 class Policy(nn.Module):
-    """(state[, condition][, time][, obstacle][, k]) ↦ (velocity, status[, distance to the skill's manifold]).
+    """(state[, condition][, time][, obstacle][, k][, start]) ↦ (velocity, status[, distance to the manifold][, S]).
 
     States are what the robot measures: positions, joints, or positions with orientations, whose velocities are those of
     the frame at rest. Of spheres told at run time, positions keep clear. In the group S³ the sign of a quaternion
-    counts: it has to follow the motion, which starts on the side of the mean orientation.
+    counts: it has to follow the motion, which starts on the side of the mean orientation. S is the distance that a
+    safety region is made of. Where starts are remembered, the one that is told stays what it is while the motion lasts.
 
     Args:
         skill: Trained.
@@ -50,6 +53,7 @@ class Policy(nn.Module):
         self.channels = plain.state_channels
         self.joints = plain.joints if self.pose is not None else 0  # in front of a pose
         self.embedded, self.decoder = _embedded(plain), _decoder(plain)
+        self.safe = plain.field.field if isinstance(plain.field.field, SafeField) else None
         self.inputs = tuple(self._inputs())
         self.outputs = tuple(self._outputs())
 
@@ -71,17 +75,22 @@ class Policy(nn.Module):
         status = torch.where(is_defined, torch.where(is_inside, Status.ok, Status.outside), Status.undefined)
         trusted = tuple(torch.where(is_defined[..., None], one, 0) for one in velocities)
         offset = self._offset(x, z, stretch)
-        return (*trusted, status) if offset is None else (*trusted, status, offset.norm(dim=-1))
+        told = [] if offset is None else [offset.norm(dim=-1)]
+        if self.safe is not None:
+            region = self.safe.region
+            told.append(region.distance(z[..., :PLANE]).clamp(max=region.levels.inactive))
+        return (*trusted, status, *told)
 
-    def _state(self, given: Mapping[str, Tensor]) -> tuple[State, Bool[Tensor, "*batch"]]:
-        """x, and whether its orientation is a rotation."""
+    def _state(self, given: Mapping[str, Tensor], when: str = "") -> tuple[State, Bool[Tensor, "*batch"]]:
+        """x, now or at the start, and whether its orientation is a rotation."""
         if self.pose is None:
-            x = given[self.inputs[0].name]
+            x = given[when + self.inputs[0].name]
             return x, torch.ones_like(x[..., 0], dtype=torch.bool)
-        length = given[ports.ORIENTATION].norm(dim=-1, keepdim=True)
-        x = self.pose.to_vector(given[ports.POSITION], given[ports.ORIENTATION] / length)
+        orientation = given[when + ports.ORIENTATION]
+        length = orientation.norm(dim=-1, keepdim=True)
+        x = self.pose.to_vector(given[when + ports.POSITION], orientation / length)
         if self.joints:
-            x = torch.cat([given[ports.JOINTS], x], dim=-1)
+            x = torch.cat([given[when + ports.JOINTS], x], dim=-1)
         return x, ((length - 1).abs() < ROTATION_TOLERANCE)[..., 0]
 
     def _units(self, given: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
@@ -95,22 +104,30 @@ class Policy(nn.Module):
     ) -> tuple[Tensor, Velocity]:
         """Latent state, with the code of a condition behind it, and ẋ."""
         field, augmented = self.field, x
+        carried = None
+        if field.start_memory is not None:
+            carried = field.start_memory.carried(self._state(given, ports.START)[0])
+            augmented = x - carried.at(given[ports.ELAPSED])
         if self.conditional is not None:
             augmented = self.conditional.augmented(x, given[ports.CONDITION])
         z, push_forward = field.chart.linearise(augmented)
         latent = self._latent_velocity(z, given)
         if ports.ELAPSED in given:
             latent = field.paced(latent, given[ports.ELAPSED] / (field.time_unit_s * slowdown), field.law_at(z))
-        return z, stretch / (field.time_unit_s * slowdown) * push_forward(latent)[..., : self.dim]
+        velocity = stretch / (field.time_unit_s * slowdown) * push_forward(latent)[..., : self.dim]
+        return z, velocity if carried is None else velocity + carried.velocity(given[ports.ELAPSED])
 
     def _latent_velocity(self, z: Tensor, given: Mapping[str, Tensor]) -> Tensor:
         """As the field has it, with the rate k that is asked for."""
         if self.embedded is None:
             velocity: Tensor = self.field.field(z)
             return velocity
-        along = z[..., : self.embedded.skill_dim]
+        place = z[..., : self.embedded.skill_dim]
         across = z[..., self.embedded.skill_dim : self.embedded.dim]
-        parts = [self.embedded.field(along), -given[ports.TRANSVERSE_RATE] * across]
+        along = self.embedded.field(place)
+        if self.safe is not None:
+            along = self.safe.steered(place, along)
+        parts = [along, -given[ports.TRANSVERSE_RATE] * across]
         return torch.cat([*parts, torch.zeros_like(z[..., self.embedded.dim :])], -1)
 
     def _offset(self, x: State, z: Tensor, stretch: Tensor) -> Tensor | None:
@@ -155,7 +172,20 @@ class Policy(nn.Module):
         if self.embedded is not None:
             rate = float(self.embedded.transverse_rate)
             found.append(Input(ports.TRANSVERSE_RATE, 1, "1/mean duration", (rate,)))
-        return found
+        return [*found, *self._start_inputs(found)]
+
+    def _start_inputs(self, found: Sequence[Input]) -> list[Input]:
+        """What may be told of the start: by default, that it is the mean one, of which there is nothing to remember."""
+        if self.field.start_memory is None:
+            return []
+        start = self.field.start_memory.mean_start
+        parts = {found[0].name: start}
+        if self.pose is not None:
+            joints, pose = start.tensor_split([self.joints])
+            position, orientation = self.pose.to_pose(pose)
+            parts = {ports.JOINTS: joints, ports.POSITION: position, ports.ORIENTATION: orientation}
+        measured = [one for one in found if one.name in parts]
+        return [replace(one, name=ports.START + one.name, default=tuple(parts[one.name].tolist())) for one in measured]
 
     def _outputs(self) -> list[Output]:
         if self.pose is not None:
@@ -167,12 +197,16 @@ class Policy(nn.Module):
             units = self.inputs[0].unit.split(", ")
             found = [Output(ports.VELOCITY, self.dim, ", ".join(f"{unit}/s" for unit in units))]
         found.append(Output(ports.STATUS, None, "1"))
-        return found if not self.has_manifold else [*found, Output(ports.OFF_MANIFOLD, None, "m")]
+        if self.has_manifold:
+            found.append(Output(ports.OFF_MANIFOLD, None, "m"))
+        if self.safe is not None:
+            found.append(Output(ports.SAFETY, None, "1"))
+        return found
 
 
 def _embedded(skill: Skill) -> EmbeddedField | None:
     field = skill.field.field
-    inner = field.field if isinstance(field, Standing) else field
+    inner = field.field if isinstance(field, Standing | SafeField) else field
     return inner if isinstance(inner, EmbeddedField) else None
 
 

@@ -8,8 +8,9 @@ CONDITION, ELAPSED = "condition", "elapsed_s"
 OBSTACLE_CENTRE, OBSTACLE_RADIUS = "obstacle_centre_m", "obstacle_radius_m"
 OBSTACLE_VELOCITY = "obstacle_velocity_m_per_s"
 TRANSVERSE_RATE = "transverse_rate_per_duration"
+START = "start_"  # before the name of a measured input: what that was when the motion began
 VELOCITY, JOINT_VELOCITY, OMEGA = "velocity_m_per_s", "joint_velocity_rad_per_s", "angular_velocity_rad_per_s"
-STATUS, OFF_MANIFOLD = "status", "off_manifold_m"
+STATUS, OFF_MANIFOLD, SAFETY = "status", "off_manifold_m", "safety_distance"
 
 
 class Status(IntEnum):

@@ -47,6 +47,25 @@ class ArrayField:
         """The same field for a motion that has run for some time already [s]."""
         return ArrayField(self.field.later(begin_s), begins_on_manifold=False, **self._rollout_options)
 
+    def on_its_way(self) -> "ArrayField":
+        """The same field, of which starts are not projected first."""
+        return ArrayField(self.field, begins_on_manifold=False, **self._rollout_options)
+
+    def begun(self, starts: Float[np.ndarray, "start D"]) -> "ArrayField":
+        """The field of motions from these starts, which it may remember."""
+        return ArrayField(self.field.begun(self.tensor(starts)), self.begins_on_manifold, **self._rollout_options)
+
+    def forgetful(self) -> "ArrayField":
+        """The field of states on their way, whose starts are not remembered."""
+        return ArrayField(self.field.forgetful(), self.begins_on_manifold, **self._rollout_options)
+
+    def without_offsets(
+        self, states: Float[np.ndarray, "start time D"], times_s: Float[np.ndarray, " time"]
+    ) -> Float[np.ndarray, "start time D"]:
+        """States of motions without what is remembered of where they began, at times as :meth:`velocity` has them."""
+        carried = self.field.carried
+        return states if carried is None else states - _array(carried.along(self.tensor(times_s)))
+
     def exact(self) -> "ArrayField":
         """The same field in double precision, followed in closed form or by steps that adapt to it.
 

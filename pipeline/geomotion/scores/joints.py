@@ -94,7 +94,7 @@ def judge_returns(
         protocol: The displacements.
         proven_rate: τ > 0 of the certificate [1/s]; None if nothing is proven.
     """
-    exact, displaced = field.exact(), judged[: protocol.count]
+    exact, displaced = field.exact().forgetful(), judged[: protocol.count]  # displaced is not begun elsewhere
     parts = [
         follow_displaced(exact, one, protocol.offsets(joints)[number :: len(displaced)])
         for number, one in enumerate(displaced)

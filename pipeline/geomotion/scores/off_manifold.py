@@ -61,7 +61,7 @@ def judge_off_manifold(field: ChartedField, judged: Sequence[Judged], separation
     dtype = next(field.parameters()).dtype
     scores: dict[str, Score] = {}
     for subset, is_trained in (("train", True), ("heldout", False)):
-        members = [one.states for one in judged if one.is_trained is is_trained]
+        members = [_without_offset(field, one) for one in judged if one.is_trained is is_trained]
         for where, parts in (("states", members), ("starts", [states[:1] for states in members])):
             states = np.concatenate(parts) if parts else np.empty((0, field.dim))
             found = beside_manifold(field, torch.as_tensor(states, dtype=dtype)) if len(states) else None
@@ -74,3 +74,12 @@ def judge_off_manifold(field: ChartedField, judged: Sequence[Judged], separation
                 note = f"from {where} to their projections on the manifold"
                 scores[f"{name}_{what}"] = mean_score(distances, unit, note)
     return Evaluation(scores)
+
+
+def _without_offset(field: ChartedField, one: Judged) -> Float[np.ndarray, "time D"]:
+    """Demonstrated states without what a remembered start carries along, which is not beside the skill."""
+    if field.start_memory is None:
+        return one.states
+    dtype = next(field.parameters()).dtype
+    carried = field.start_memory.carried(torch.as_tensor(one.states[0], dtype=dtype))
+    return np.asarray(one.states - carried.along(torch.as_tensor(one.time_s, dtype=dtype)).double().numpy())

@@ -115,21 +115,24 @@ def follow_pushed(field: ArrayField, starts: Float[np.ndarray, "start D"], proto
     after = slice(push, push + round(FOLLOWED * TIMES_PER_DURATION) + 1)
     times_s = step_s * np.arange(round(UNDISTURBED * TIMES_PER_DURATION) + 1)
     undisturbed = field.roll(starts, times_s)
-    nominal = _speeds(field, undisturbed, times_s).max(axis=1)
+    nominal = _speeds(field, starts, undisturbed, times_s).max(axis=1)
     start = np.arange(protocol.count) % len(starts)
-    later = field.later(float(times_s[push]))
+    later = field.begun(starts[start]).later(float(times_s[push]))
     after_s = times_s[after] - times_s[push]
     pushed = later.roll(undisturbed[start, push] + protocol.offsets(starts.shape[1]), after_s)
     alongside = undisturbed[start, after]
-    between = claimed_coordinates(field.to_claimed, pushed) - claimed_coordinates(field.to_claimed, alongside)
+    claimed, beside = (
+        claimed_coordinates(field.to_claimed, later.without_offsets(states, after_s)) for states in (pushed, alongside)
+    )
+    speeds = _speeds(field, starts[start], pushed, times_s[after])
     paths = [Path(path[:, :3]) for path in undisturbed]
     to_path = [paths[which].distances(states[:, :3]) for which, states in zip(start, pushed, strict=True)]
     return Pushed(
         after_s,
         np.array(to_path),
         np.linalg.norm(pushed[..., :3] - alongside[..., :3], axis=-1),
-        np.linalg.norm(between, axis=-1),
-        _speeds(later, pushed, after_s).max(axis=1) / nominal[start],
+        np.linalg.norm(claimed - beside, axis=-1),
+        speeds.max(axis=1) / nominal[start],
     )
 
 
@@ -162,11 +165,15 @@ def _recovery_ratio(pushed: Pushed, rate: float, note: str) -> Score:
 
 
 def _speeds(
-    field: ArrayField, states: Float[np.ndarray, "start time D"], times_s: Float[np.ndarray, " time"]
+    field: ArrayField,
+    starts: Float[np.ndarray, "start D"],
+    states: Float[np.ndarray, "start time D"],
+    times_s: Float[np.ndarray, " time"],
 ) -> Float[np.ndarray, "start time"]:
-    """Speeds of positions [m/s]."""
+    """Speeds of positions at times since motions began at these starts [m/s]."""
     elapsed_s = np.tile(times_s, len(states))
-    velocities = field.velocity(states.reshape(-1, states.shape[-1]), elapsed_s)
+    begun = field.begun(np.repeat(starts, len(times_s), axis=0))
+    velocities = begun.velocity(states.reshape(-1, states.shape[-1]), elapsed_s)
     return np.asarray(np.linalg.norm(velocities[:, :3], axis=1).reshape(states.shape[:2]))
 
 

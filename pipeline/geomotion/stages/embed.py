@@ -13,7 +13,7 @@ from geomotion.config import EncoderConfig, ManipulationSkill
 from geomotion.demos import storage
 from geomotion.demos.generators.panda_grasp_and_drop import PLACES_M
 from geomotion.demos.snapshots import BETWEEN, Snapshots
-from geomotion.errors import CorruptArtefact, InvalidSetting
+from geomotion.errors import CorruptArtefact
 from geomotion.files import read_json, write_json
 from geomotion.pictured_skills import save_embedding
 from geomotion.tracking import Artefacts, StageRun
@@ -36,14 +36,10 @@ def embed(config: EmbedConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
 
     Raises:
         CorruptArtefact: If the model has no conditions.
-        InvalidSetting: If the trajectories of its field are not known in closed form, which their loss needs.
     """
     skill = conditional_models.load(inputs["train"].path("model.pt"))
     if not isinstance(skill, ConditionalSkill):
         raise CorruptArtefact(inputs["train"].path("model.pt"), "this model has no conditions")
-    if config.encoder.trajectory_weight > 0 and not skill.augmented.field.is_solvable:
-        weight = config.encoder.trajectory_weight
-        raise InvalidSetting("encoder.trajectory_weight", weight, "0, but for field=linear trained on trajectories")
     name = f"{config.skill.value}.npz"
     pictures = Snapshots.load(inputs["snapshots"].path(name))
     with np.load(inputs["encode"].path(name), allow_pickle=False) as found:
@@ -57,6 +53,7 @@ def embed(config: EmbedConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
         "skill": config.skill.value,
         "encoder": read_json(inputs["encode"].path("encoder.json")),
         "losses": losses,
+        "knows_elsewhere": embedding.knows_elsewhere,
         "training_pictures": int((~is_test).sum()),
         "held_out": _judged(embedding, _rows(seen, is_test), pictures.object_m[is_test]),
     }

@@ -24,11 +24,13 @@ class EncodeConfig:
         weights: ``random``, a folder, or a name on the hub.
         tiles: Along each side of a picture.
         seed: Of random weights.
+        weights_sha256: Of the parameters, where they are not random: what is behind the name of a folder may change.
     """
 
     weights: str
     tiles: int
     seed: int
+    weights_sha256: str | None = None
 
 
 def encode(config: EncodeConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:

@@ -39,6 +39,7 @@ from geomotion.scores.goal import judge_goal
 from geomotion.scores.grids import Box, bounding_box, sample_box
 from geomotion.scores.joints import ReturnProtocol, judge_joints, judge_returns
 from geomotion.scores.latent_plane import latent_plane
+from geomotion.scores.manifold_starts import judge_manifold_starts
 from geomotion.scores.nearby import judge_nearby, nearby_starts
 from geomotion.scores.off_manifold import Separation, judge_off_manifold
 from geomotion.scores.paths import PosePath
@@ -170,6 +171,7 @@ def compute(
             _poses(skill, [*trained, *heldout]),
             _joints(field, skill, [*trained, *heldout], settings, proven_rate),
             judge_off_manifold(skill.field, [*trained, *heldout], _separation(skill)),
+            _manifold_starts(field, skill, scene, settings),
             _contraction(field, scene, settings, proven_rate),
             _region(field, scene, settings),
             _nearby(field, scene, settings, proven_rate),
@@ -239,7 +241,8 @@ def _judged(field: ArrayField, demonstration: Trajectory, skill: Skill, is_train
     velocities = demonstration.velocity(skill.state_channels)
     rollout = field.roll(states[:1], time_s)[0]
     # a plan has no velocities but its own
-    predicted = np.gradient(rollout, time_s, axis=0) if field.is_plan else field.velocity(states, time_s)
+    led = field.begun(states[:1])
+    predicted = np.gradient(rollout, time_s, axis=0) if field.is_plan else led.velocity(states, time_s)
     return Judged(time_s, states, velocities, rollout, predicted, is_trained)
 
 
@@ -316,8 +319,15 @@ def _region(field: ArrayField, scene: Scene, settings: EvaluationConfig) -> Eval
 def _nearby(field: ArrayField, scene: Scene, settings: EvaluationConfig, proven_rate: float | None) -> Evaluation:
     deviation = settings.nearby_spread * scene.tight.diagonal
     starts = nearby_starts(scene.start, settings.nearby_starts, deviation, settings.seed)
-    exact = field.exact()  # or the bound would be held against the solver's errors
+    # exact, or the bound would be held against the solver's errors; it is of motions that remember the same start
+    exact = field.exact().forgetful()
     return judge_nearby(exact.roll, exact.to_claimed, starts, scene.time_s, proven_rate)
+
+
+def _manifold_starts(field: ArrayField, skill: Skill, scene: Scene, settings: EvaluationConfig) -> Evaluation:
+    deviation = settings.nearby_spread * scene.tight.diagonal
+    starts = nearby_starts(scene.start, settings.nearby_starts, deviation, settings.seed)
+    return judge_manifold_starts(field, starts, scene.time_s, state_unit(skill.state_channels))
 
 
 def _goal(field: ArrayField, scene: Scene, settings: EvaluationConfig, goal: NDArray[np.float64]) -> Evaluation:

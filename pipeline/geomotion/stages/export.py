@@ -2,7 +2,8 @@
 
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from dataclasses import field as default
 from importlib.resources import files
 from typing import Any
 
@@ -12,18 +13,20 @@ from numpy.typing import NDArray
 
 from geomotion import conditional_models
 from geomotion.conditional_models import ConditionalSkill
-from geomotion.config import PolicyConfig
+from geomotion.config import NoObstacle, NoSafety, ObstacleConfig, PolicyConfig, SafetyConfig
 from geomotion.demos import storage
 from geomotion.demos.demonstrations import Demonstrations
 from geomotion.demos.pose_vectors import with_pose_vectors
 from geomotion.export import Arrays, OnnxPolicy, export_onnx, query_time_ms
 from geomotion.files import write_json
 from geomotion.models import Skill
+from geomotion.obstacles.safety_region import Levels
 from geomotion.policy import ports
 from geomotion.policy.policy import Policy
 from geomotion.policy.ports import Input, Status
 from geomotion.policy.sphere import Avoidance
 from geomotion.policy.training_range import TrainingRange
+from geomotion.stages.safety import safe
 from geomotion.tracking import Artefacts, StageRun
 from geomotion.types import Tensor
 
@@ -40,10 +43,14 @@ class ExportConfig:
     Attributes:
         policy: What a policy says of states outside of the demonstrations, and does about obstacles.
         register_as: Name in MLflow's model registry; None to leave it out.
+        safety: In which region the policy stays; none for any.
+        obstacle: What is kept out of that region; without a region a policy is told of obstacles at run time.
     """
 
     policy: PolicyConfig
     register_as: str | None = None
+    safety: SafetyConfig = default(default_factory=NoSafety)
+    obstacle: ObstacleConfig = default(default_factory=NoObstacle)
 
 
 def export(config: ExportConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
@@ -52,8 +59,11 @@ def export(config: ExportConfig, inputs: Mapping[str, Artefacts], run: StageRun)
     ``policy.json`` tells inputs, outputs, agreement with the trained model and query time.
     """
     skill = conditional_models.load(inputs["train"].path("model.pt"))
+    every = with_pose_vectors(storage.load(inputs["ingest"].folder), _plain(skill).pose)
+    if (region := safe(config.safety, config.obstacle, skill, every)) is not None:
+        skill = replace(region.skill, field=region.charted_field())
     plain = _plain(skill)
-    demonstrations = with_pose_vectors(storage.load(inputs["ingest"].folder).select(plain.train_demos), plain.pose)
+    demonstrations = every.select(plain.train_demos)
     policy = trained_policy(skill, demonstrations, config.policy)
     path = run.folder / "policy.onnx"
     export_onnx(policy, path)
@@ -64,6 +74,7 @@ def export(config: ExportConfig, inputs: Mapping[str, Artefacts], run: StageRun)
         **_goals(skill),
         "range": _range(policy),
         **({} if plain.pose is None else {"pose": plain.pose.document()}),
+        **({} if policy.safe is None else {"safety": _levels(policy.safe.region.levels)}),
         "example": {
             "inputs": {name: values[0].tolist() for name, values in start.items()},
             "goal": _goal(skill, demonstrations),
@@ -121,7 +132,8 @@ def demonstrated_start(policy: Policy, demonstrations: Demonstrations) -> Arrays
     """What a robot would tell the policy at the start of the first demonstration."""
     first = demonstrations[0]
     state = torch.tensor(first.state(policy.channels)[:1])
-    return _arrays(policy, state, torch.tensor([first.condition]), torch.zeros(1, 1))
+    asked = _arrays(policy, state, torch.tensor([first.condition]), torch.zeros(1, 1))
+    return {**asked, **_remembered(policy, state)}
 
 
 def _plain(skill: Skill | ConditionalSkill) -> Skill:
@@ -173,6 +185,10 @@ def _goal(skill: Skill | ConditionalSkill, demonstrations: Demonstrations) -> li
     return list(skill.geometry.goal[: (skill.joints or 3) if skill.pose is not None else None])
 
 
+def _levels(levels: Levels) -> dict[str, float]:
+    return {"rho": levels.impenetrable, "nu": levels.inactive}
+
+
 def _range(policy: Policy) -> dict[str, Any]:
     found = policy.training_range
     conditions = [ports.CONDITION] if policy.conditional is not None else []
@@ -180,7 +196,7 @@ def _range(policy: Policy) -> dict[str, Any]:
 
 
 def _largest_differences(policy: Policy, exported: OnnxPolicy, demonstrations: Demonstrations) -> dict[str, float]:
-    """Over random states in the range of the demonstrations, without and with a ball in the way."""
+    """Over random states in the range of the demonstrations, plainly, and with a ball in the way and a start told."""
     generator = torch.Generator().manual_seed(0)
     lower, upper = (side[: policy.dim] for side in (policy.training_range.lower, policy.training_range.upper))
     states = lower + torch.rand(CHECKED_STATES, policy.dim, generator=generator) * (upper - lower)
@@ -193,6 +209,7 @@ def _largest_differences(policy: Policy, exported: OnnxPolicy, demonstrations: D
         width = changed[ports.OBSTACLE_CENTRE].shape[1]
         changed[ports.OBSTACLE_CENTRE][:] = ((lower + upper) / 2)[:width].numpy()
         changed[ports.OBSTACLE_RADIUS][:] = BALL * policy.scale_m
+    changed |= _remembered(policy, torch.tensor(demonstrations[0].state(policy.channels)[:1]))
     largest: dict[str, float] = {}
     for inputs in (asked, asked | changed):
         with torch.no_grad():
@@ -210,13 +227,21 @@ def _or_default(one: Input, inputs: Arrays) -> NDArray[np.float32]:
 
 
 def _arrays(policy: Policy, states: Tensor, conditions: Tensor, times_s: Tensor) -> Arrays:
-    """What a robot in these states would tell the policy."""
-    if policy.pose is None:
-        measured = {policy.inputs[0].name: states}
-    else:
-        joints, pose = states.float().tensor_split([policy.joints], dim=-1)
-        position, orientation = policy.pose.to_pose(pose)
-        measured = {ports.JOINTS: joints} if policy.joints else {}
-        measured |= {ports.POSITION: position, ports.ORIENTATION: orientation}
-    asked = measured | {ports.CONDITION: conditions, ports.ELAPSED: times_s}
+    """What a robot in these states has to tell the policy."""
+    asked = _measured(policy, states) | {ports.CONDITION: conditions, ports.ELAPSED: times_s}
     return {one.name: asked[one.name].float().numpy() for one in policy.inputs if one.default is None}
+
+
+def _measured(policy: Policy, states: Tensor) -> dict[str, Tensor]:
+    if policy.pose is None:
+        return {policy.inputs[0].name: states}
+    joints, pose = states.float().tensor_split([policy.joints], dim=-1)
+    position, orientation = policy.pose.to_pose(pose)
+    measured = {ports.JOINTS: joints} if policy.joints else {}
+    return measured | {ports.POSITION: position, ports.ORIENTATION: orientation}
+
+
+def _remembered(policy: Policy, start: Tensor) -> Arrays:
+    """What a robot that began there may tell the policy of it."""
+    told = {ports.START + name: value.float().numpy() for name, value in _measured(policy, start).items()}
+    return {one.name: told[one.name] for one in policy.inputs if one.name in told}

@@ -4,9 +4,10 @@ from dataclasses import replace
 from typing import Any
 
 from geomotion import conditional_models
-from geomotion.config import DatasetConfig, NcdsConfig, NoObstacle
+from geomotion.config import DatasetConfig, NcdsConfig, NoObstacle, NoSafety
 from geomotion.figures.report.conditions import condition_rows
 from geomotion.figures.studies.fields import FIELD_STUDY_FIGURES
+from geomotion.figures.studies.manifold_starts import manifold_starts
 from geomotion.figures.studies.nearby import nearby
 from geomotion.files import read_json
 from geomotion.models import ModelConfig, Skill
@@ -55,11 +56,15 @@ def _evaluate_config(session: Session) -> EvaluateConfig:
 
 
 def _export_config(session: Session) -> ExportConfig:
-    return ExportConfig(session.config.policy, session.config.tracking.register_as)
+    config: NcdsConfig = session.config
+    policy, name = config.policy, config.tracking.register_as
+    if isinstance(config.safety, NoSafety):  # obstacles are told at run time: others are no reason for another export
+        return ExportConfig(policy, name)
+    return ExportConfig(policy, name, config.safety, config.obstacle)
 
 
 def _replay_config(session: Session) -> PolicyReplayConfig:
-    return PolicyReplayConfig(session.config.replay, session.config.obstacle)
+    return PolicyReplayConfig(session.config.replay, session.config.obstacle, session.config.safety)
 
 
 def _report_config(session: Session) -> ReportConfig:
@@ -178,5 +183,5 @@ NCDS = Program(
         "check": shared.check_verb,
     },
     execution_keys=shared.EXECUTION_KEYS | {"solver", "rollout", "replay", "body", "policy", "safety"},
-    study_figures={**FIELD_STUDY_FIGURES, "nearby": nearby},
+    study_figures={**FIELD_STUDY_FIGURES, "nearby": nearby, "manifold_starts": manifold_starts},
 )

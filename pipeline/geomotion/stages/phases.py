@@ -111,9 +111,9 @@ def phases(
         schedule.append((float(switch["time_s"]), key, skill.conditioning.checked(switch["condition"], key)))
     plain = [(begins, condition, skill.given(condition, key)) for begins, key, condition in schedule]
     return [
-        Phase(begins, condition, later, modulated(_later(obstacle, begins), later))
+        Phase(begins, condition, skill_then, modulated(later(obstacle, begins), skill_then))
         for begins, condition, given in plain
-        for later in [replace(given, field=given.field.later(begins))]
+        for skill_then in [replace(given, field=given.field.later(begins))]
     ]
 
 
@@ -204,7 +204,7 @@ def _change(phase: Phase, states: Float[Tensor, "time D"], times: Times) -> dict
     return change | bound if all(map(math.isfinite, distances)) else change
 
 
-def _later(obstacle: ObstacleConfig, time_s: float) -> ObstacleConfig:
+def later(obstacle: ObstacleConfig, time_s: float) -> ObstacleConfig:
     """The obstacles where their velocities take them meanwhile."""
     if isinstance(obstacle, SeveralObstacles):
         return replace(obstacle, bodies=[_moved(body, time_s) for body in solids(obstacle)])

@@ -3,10 +3,10 @@
 from dataclasses import replace
 from typing import Any
 
-from geomotion.config import GraspAndDropDataset, ManipulationSkill, NcdsConfig
+from geomotion.config import GraspAndDropDataset, LinearField, ManipulationSkill, NcdsConfig
 from geomotion.errors import InvalidSetting
 from geomotion.files import read_json
-from geomotion.networks.image_encoder import RANDOM, ImageEncoder
+from geomotion.networks.image_encoder import RANDOM, digest_of_weights
 from geomotion.robot.closed_loop import steps_per_period
 from geomotion.stages.embed import EmbedConfig, embed
 from geomotion.stages.encode import EncodeConfig, encode
@@ -34,7 +34,8 @@ def _pictured(session: Session) -> GraspAndDropDataset:
 
 def _encode_config(session: Session) -> EncodeConfig:
     encoder = session.config.encoder
-    return EncodeConfig(encoder.weights, encoder.tiles, encoder.seed)
+    digest = None if encoder.weights == RANDOM else digest_of_weights(encoder.weights)
+    return EncodeConfig(encoder.weights, encoder.tiles, encoder.seed, digest)
 
 
 def _embed_config(session: Session) -> EmbedConfig:
@@ -57,17 +58,19 @@ def run_pictured(session: Session) -> VerbResult:
     """Train both policies and their embeddings, score both, and let them act.
 
     Raises:
-        InvalidSetting: If demonstrations were chosen by number, which would be those of one skill alone, or the control
-            rate does not divide that of the simulation; before anything is done.
+        InvalidSetting: If demonstrations were chosen by number, which would be those of one skill alone, the control
+            rate does not divide that of the simulation, or embeddings need trajectories that the field does not have in
+            closed form; before anything is done.
         MissingData: If there are no such weights of the encoder; before anything is done.
     """
     dataset = _dataset(session)
     if (dataset.train_demos, dataset.test_demos) != dataset.demos_of(dataset.skill):
         raise InvalidSetting("dataset.train_demos", dataset.train_demos, "null: `run` trains both skills; see held_out")
     steps_per_period(session.config.episodes.control_hz, "episodes.control_hz")
+    weight = session.config.encoder.trajectory_weight
+    if weight > 0 and not isinstance(session.config.field, LinearField):
+        raise InvalidSetting("encoder.trajectory_weight", weight, "0, but for field=linear trained on trajectories")
     seeing = _encode_config(session)
-    if seeing.weights != RANDOM:
-        ImageEncoder(seeing.weights)
     done: dict[str, Artefacts] = {}
     for skill in reversed(ManipulationSkill):  # the grasp last: it is what `run=latest` then finds
         one = _about(session, skill)

@@ -23,6 +23,21 @@ PUSH_M, PUSH_S, PUSH_AT = 0.05, 0.25, 0.4  # where nothing else is asked for; th
 Disturbances = Sequence[Push | Displacement]
 
 
+def cannot_start(arm: Arm, alone: Undisturbed, begins: Beginning) -> str | None:
+    """Why the arm cannot take the start of a motion; None if it can."""
+    if not alone.path.reached[0]:
+        left_mm = 1000 * alone.path.position_error_m[0]
+        return f"the arm cannot take the start, {begins.label}: {left_mm:.0f} mm remain"
+    with ArmScene(arm, panda.GRIPPER) as scene:
+        scene.set_joints(alone.path.joints_rad[0])
+        touching = scene.self_clearances(up_to_m=0.0)
+    if not touching:
+        return None
+    links, apart_m = min(touching.items(), key=lambda one: one[1])
+    deep = f"{' and '.join(links)}, {-1000 * apart_m:.0f} mm deep"
+    return f"the arm would hit itself at the start, {begins.label}: {deep}. Motions are in the arm's base frame"
+
+
 def disturbances(config: schema.ReplayConfig, begins: Beginning, alone: Undisturbed) -> Disturbances:
     """The pushes that are asked for, in the order in which they begin; by default one, if the motion lasts as long.
 

@@ -15,6 +15,7 @@ from geomotion.robot.arm import Arm
 from geomotion.robot.disturbances import Measured
 from geomotion.robot.field_policy import ArmStates, PoseStates
 from geomotion.robot.policy_loop import PolicyRun
+from geomotion.robot.recording import Tracking
 from geomotion.robot.timed import RATE_HZ
 from geomotion.scores.paths import PosePath
 from geomotion.scores.pushes import Path
@@ -104,13 +105,7 @@ def judge_run(
         run: What the arm did.
         effort_nm: What each motor can give [N m].
     """
-    tracking = run.tracking
-    executed = np.array(
-        [
-            states.state(Measured(*row))
-            for row in zip(tracking.position_m, tracking.orientation_wxyz, tracking.joints_rad, strict=True)
-        ]
-    )
+    tracking, executed = run.tracking, executed_states(states, run.tracking)
     deviation = _deviation(skill, moved, alone, run, executed)
     changes_s = [] if moved is None else moved.times_s.tolist()
     events_s = sorted([*(push.time_s for push in pushes), *changes_s, float(tracking.time_s[-1])])
@@ -125,6 +120,12 @@ def judge_run(
         float((np.abs(run.torque_nm) / effort_nm).max()),
         float((np.abs(run.velocity_rad_per_s) / arm.limits.velocity_rad_per_s).max()),
     )
+
+
+def executed_states(states: ArmStates, tracking: Tracking) -> States:
+    """States at every step of the simulation, read from the start on."""
+    rows = zip(tracking.position_m, tracking.orientation_wxyz, tracking.joints_rad, strict=True)
+    return np.array([states.state(Measured(*row)) for row in rows])
 
 
 def _next(events_s: Sequence[float], time_s: float) -> float:
@@ -143,10 +144,12 @@ def _deviation(
 
 @torch.no_grad()
 def _claimed(skill: Skill, moved: MovedGoal | None, time_s: Float[np.ndarray, " time"], states: States) -> States:
-    """ψ of states, seen from where the goal is."""
-    x = torch.tensor(states, dtype=torch.float32)
+    """ψ of states, seen from where the goal is and without what is remembered of the start."""
+    x, elapsed_s = torch.tensor(states, dtype=torch.float32), torch.tensor(time_s, dtype=torch.float32)[:, None]
     if moved is not None:
-        x = x - moved.shift(torch.tensor(time_s, dtype=torch.float32)[:, None])
+        x = x - moved.shift(elapsed_s)
+    if skill.field.carried is not None:
+        x = x - skill.field.carried.at(elapsed_s)
     return np.asarray(skill.field.chart.to_latent(x).double().numpy())
 
 

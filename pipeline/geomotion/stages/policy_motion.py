@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from dataclasses import field as default
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,9 @@ from geomotion.robot.arm import Arm
 from geomotion.robot.field_policy import JointStates, PoseStates, PositionStates
 from geomotion.robot.inverse_kinematics import JointPath, exactly, solve_path
 from geomotion.robot.panda_arm import panda_arm
+from geomotion.safe_skills import SafeSkill
+from geomotion.stages.phases import Start
+from geomotion.stages.safe_motion import follow_in_region
 from geomotion.stages.scene import around_obstacles, grown, solids
 
 ARM_STATES: Mapping[tuple[str, ...], int] = {**BODY_STATES, ("joints_rad",): len(panda.JOINTS)}
@@ -41,6 +45,7 @@ class PolicyReplayConfig:
 
     replay: schema.ReplayConfig
     obstacle: schema.ObstacleConfig
+    safety: schema.SafetyConfig = default(default_factory=schema.NoSafety)
 
 
 @dataclass(frozen=True)
@@ -117,14 +122,22 @@ def _demonstration(start: Any, count: int) -> int:
     return int(number)
 
 
-def led_field(config: PolicyReplayConfig, skill: Skill) -> tuple[TimedVelocity, MovedGoal | None]:
-    """The skill's field among obstacles and with a goal that moves, and the latter alone if it does.
+def led_field(
+    config: PolicyReplayConfig, skill: Skill, region: SafeSkill | None = None
+) -> tuple[TimedVelocity, MovedGoal | None]:
+    """The skill's field in its safety region, or among obstacles and with a goal that moves, and that alone if it does.
 
     Raises:
-        InvalidSetting: If an obstacle covers the goal, or something in space is asked of a skill of joints.
+        InvalidSetting: If an obstacle covers the goal, something in space is asked of a skill of joints, or the goal
+            is to leave the safety region.
     """
-    field: TimedVelocity = skill.field
     changes, goal = config.replay.goal_changes, skill.goal
+    if region is not None:
+        if changes:
+            expected = "[] with safety=riemannian: the region lies around the demonstrations, which end at the goal"
+            raise InvalidSetting("replay.goal_changes", f"{len(changes)} of them", expected)
+        return region.charted_field(), None
+    field: TimedVelocity = skill.field
     is_in_space = skill.state_channels != ("joints_rad",)
     if not is_in_space and (changes or solids(config.obstacle)):
         raise InvalidSetting("replay", "goal changes or obstacles", "a skill of poses or positions, which lie in space")
@@ -138,12 +151,22 @@ def led_field(config: PolicyReplayConfig, skill: Skill) -> tuple[TimedVelocity, 
     return around or field, moved
 
 
-def undisturbed(field: TimedVelocity, states: AnyStates, begins: Beginning, arm: Arm, duration_s: float) -> Undisturbed:
+def undisturbed(
+    field: TimedVelocity,
+    states: AnyStates,
+    begins: Beginning,
+    arm: Arm,
+    duration_s: float,
+    region: SafeSkill | None = None,
+) -> Undisturbed:
     """The motion of the policy from its start, without anything that disturbs it."""
     times = torch.linspace(0, duration_s, round(duration_s * NOMINAL_HZ) + 1)
-    start = torch.tensor(begins.state, dtype=torch.float32)[None]
-    clocked = torch.cat([start, torch.zeros(1, 1)], dim=-1)
-    found = rollout(TimedField(field), clocked, times, method="rk4").states[0, :, :-1].double().numpy()
+    if region is not None:
+        start = Start(begins.label, begins.state, times.double().numpy())
+        found = follow_in_region(region, start).states.double().numpy()
+    else:
+        clocked = torch.cat([torch.tensor(begins.state, dtype=torch.float32)[None], torch.zeros(1, 1)], dim=-1)
+        found = rollout(TimedField(field), clocked, times, method="rk4").states[0, :, :-1].double().numpy()
     if isinstance(states, JointStates):
         path, position_m = exactly(found, arm.limits), arm.chain.pose(found)[0]
     else:

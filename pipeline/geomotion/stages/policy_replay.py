@@ -1,19 +1,22 @@
 """Execute a learned policy in closed loop on the simulated Panda, and judge how it copes."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from geomotion import conditional_models
 from geomotion.demos import storage
+from geomotion.demos.pose_vectors import with_pose_vectors
+from geomotion.figures.policy_region import save_policy_region_figure
 from geomotion.figures.policy_replay import PolicyPicture, save_policy_replay_figure
 from geomotion.files import read_json, write_json
 from geomotion.robot.field_policy import FieldPolicy
 from geomotion.robot.policy_loop import PolicyRun
 from geomotion.stages.executed import executed_trajectory, tracking_document, tracking_picture, tracking_rows
-from geomotion.stages.policy_execution import Disturbances, disturbances, execute
-from geomotion.stages.policy_judgement import judge_run
+from geomotion.stages.policy_execution import Disturbances, cannot_start, disturbances, execute
+from geomotion.stages.policy_judgement import executed_states, judge_run
 from geomotion.stages.policy_motion import (
     LONGER,
     Beginning,
@@ -24,6 +27,8 @@ from geomotion.stages.policy_motion import (
     simulated_panda,
     undisturbed,
 )
+from geomotion.stages.region_execution import in_region, region_document, region_picture, region_rows
+from geomotion.stages.safety import safe
 from geomotion.stages.scene import solids
 from geomotion.tables import aligned
 from geomotion.tracking import Artefacts, StageRun
@@ -34,7 +39,8 @@ __all__ = ["PolicyReplayConfig", "policy_replay_table", "replay_policy"]
 def replay_policy(config: PolicyReplayConfig, inputs: Mapping[str, Artefacts], run: StageRun) -> None:
     """Write ``replay.json``, the executed ``trajectory/``, ``film.gif`` and ``figures/closed_loop``.
 
-    Where the arm cannot take the start, nothing is executed: ``replay.json`` then says so, and the rest is left out.
+    With a safety region, the same is executed without it, to be compared in ``figures/closed_loop_region``. Where the
+    arm cannot take the start, nothing is executed: ``replay.json`` then says so, and the rest is left out.
 
     Raises:
         InvalidSetting: If the skill is of nothing that the Panda can follow, or settings do not fit it.
@@ -44,11 +50,12 @@ def replay_policy(config: PolicyReplayConfig, inputs: Mapping[str, Artefacts], r
     skill, begins = chosen_skill(config.replay, loaded, demonstrations)
     arm, duration_s = simulated_panda(config.replay), config.replay.duration_s or LONGER * begins.duration_s
     states = arm_states(skill, begins)
-    field, moved = led_field(config, skill)
-    alone = undisturbed(field, states, begins, arm, duration_s)
-    if not alone.path.reached[0]:
-        left_mm = 1000 * alone.path.position_error_m[0]
-        reason = f"the arm cannot take the start, {begins.label}: {left_mm:.0f} mm remain"
+    region = safe(config.safety, config.obstacle, loaded, with_pose_vectors(demonstrations, skill.pose))
+    if region is None:  # which is one for motions from any start
+        skill = skill.begun(begins.state)
+    field, moved = led_field(config, skill, region)
+    alone = undisturbed(field, states, begins, arm, duration_s, region)
+    if (reason := cannot_start(arm, alone, begins)) is not None:
         write_json(run.folder / "replay.json", {"executed": False, "reason": reason})
         return
     pushes = disturbances(config.replay, begins, alone)
@@ -61,6 +68,16 @@ def replay_policy(config: PolicyReplayConfig, inputs: Mapping[str, Artefacts], r
         **_timing(executed),
         **judged.document(pushes, rate_per_s),
     }
+    if region is not None:
+        unfilmed = replace(config, replay=replace(config.replay, film=False))
+        policy = FieldPolicy(skill.field, arm_states(skill, begins))
+        free = execute(unfilmed, policy, arm, alone, pushes, duration_s)[0]
+        with_region, without = (
+            in_region(region, executed_states(arm_states(skill, begins), one.tracking), one.tracking)
+            for one in (executed, free)
+        )
+        document["safety"] = region_document(region, with_region, without)
+        save_policy_region_figure(region_picture(region, alone, with_region, without, pushes), run.folder / "figures")
     write_json(run.folder / "replay.json", document)
     doing = "led by a policy that was learned from"
     storage.save(
@@ -99,6 +116,7 @@ def policy_replay_rows(document: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("joint speed", f"at most {document['largest_velocity_share']:.0%} of the limit"),
         ("cut short by joint limits", f"{document['cut_short_share']:.1%} of the periods"),
         *tracking_rows(document),
+        *(region_rows(document["safety"]) if "safety" in document else ()),
     ]
 
 

@@ -19,12 +19,15 @@ from geomotion.figures.report.pictures import Picture, film, pictures
 from geomotion.figures.report.scores import tables
 from geomotion.files import read_json, write_text
 from geomotion.stages.export import differences
+from geomotion.stages.ingest import SKELETON
 from geomotion.stages.policy_replay import policy_replay_rows
 from geomotion.tracking import Artefacts, StageRun
 
 Document = Mapping[str, Any]
 STAGES = ("ingest", "train", "rollout", "evaluate", "export", "replay", "body")
 PICTURED = ("ingest", "train", "evaluate", "replay", "body")
+NO_SKELETON = "no model of the person that could be read is beside the recording; dataset.skeleton= names its file"
+NO_JOINTS = "the skill has no joints that a skeleton could be moved by"
 FILMS = {"replay": FILM, "body": BODY_FILM}
 
 
@@ -198,7 +201,6 @@ def _omitted(judged: Document, inputs: Mapping[str, Artefacts]) -> dict[str, str
     """Scores and stages that are not there, and why."""
     reasons = {f"Score {name}": str(reason) for name, reason in judged.get("omitted", {}).items()}
     if recorded(inputs["ingest"], "config.json").get("kind") == "MmmDataset" and "body" not in inputs:
-        reasons["Skeleton and film"] = (
-            "no model of the person is beside the recording; dataset.skeleton= names its file"
-        )
+        has_skeleton = (inputs["ingest"].folder / SKELETON).is_file()
+        reasons["Skeleton and film"] = NO_JOINTS if has_skeleton else NO_SKELETON
     return reasons if "rollout" in inputs else reasons | {"Rollouts": "the rollout stage was not run"}

@@ -1,5 +1,6 @@
 """Trajectories of a trained field that a robot can execute."""
 
+import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
@@ -26,9 +27,9 @@ from geomotion.models import JOINT_CHANNEL, Skill
 from geomotion.obstacles.obstacle import surface_points
 from geomotion.safe_skills import SafeSkill
 from geomotion.scores.evaluation import Unit
-from geomotion.scores.grids import bounding_box, sample_box
+from geomotion.scores.grids import Box, bounding_box, sample_box
 from geomotion.stages.evaluate import state_unit
-from geomotion.stages.phases import Followed, Phase, Start, follow_phases, phases
+from geomotion.stages.phases import Followed, Phase, Start, follow_phases, later, phases
 from geomotion.stages.safe_motion import follow_in_region
 from geomotion.stages.safety import safe
 from geomotion.stages.transition import follow_after_transition
@@ -42,7 +43,10 @@ CORNER_MARGIN = 0.2  # of the box around the demonstrations
 CORNER_DURATIONS = 3.0  # as long as the first rollout: corners are farther from the goal
 FLOW_POINTS_PER_AXIS = 40
 FLOW_MARGIN = 0.05
+FAR = 0.5  # of half the longest side of the box around the demonstrations: as exported policies have it by default
 Outcome = tuple[Start, list[Phase], Followed]
+
+_log = logging.getLogger("geomotion")
 
 
 @dataclass(frozen=True)
@@ -72,14 +76,12 @@ def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: St
     region = safe(config.safety, config.obstacle, skill, demonstrations)
     if region is not None:
         skill = replace(region.skill, field=region.charted_field())
-    obstacle = config.obstacle if region is None else NoObstacle()
+    obstacle = NoObstacle() if region is not None else _when_followed(config, skill)
     starts = _starts(config.rollout, demonstrations, skill)
-    planned = {
-        condition: phases(config.rollout, obstacle, skill, condition)
-        for condition in dict.fromkeys(start.condition for start in starts)
-    }
+    planned = _planned(config.rollout, obstacle, skill, starts)
     followed = [
-        (start, planned[start.condition], _follow(config, region, planned[start.condition], start)) for start in starts
+        (start, all_phases, _follow(config, region, all_phases, start))
+        for start, all_phases in zip(starts, planned, strict=True)
     ]
     channels = _channels(skill)
     trajectories = tuple(
@@ -88,6 +90,8 @@ def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: St
     if not trajectories:
         labels = ", ".join(start.label for start in starts)
         raise InvalidSetting("rollout", labels, "a start from which the trajectory stays finite for two points")
+    if config.rollout.starts_m is not None:
+        _warn_of_far(starts, bounding_box([one.state(channels) for one in demonstrations.trajectories]))
     storage.save(
         replace(
             demonstrations,
@@ -106,13 +110,34 @@ def rollout(config: RolloutStageConfig, inputs: Mapping[str, Artefacts], run: St
         save_figure(figure_rollouts(picture), run.folder / "figures", "rollouts", picture.arrays())
 
 
+def _planned(
+    config: RolloutConfig, obstacle: ObstacleConfig, skill: Skill | ConditionalSkill, starts: Sequence[Start]
+) -> list[list[Phase]]:
+    """The fields that each start follows: the same under one condition, unless starts are remembered."""
+    if isinstance(skill, Skill) and skill.field.start_memory is not None:
+        return [phases(config, obstacle, skill.begun(start.state), start.condition) for start in starts]
+    conditions = dict.fromkeys(start.condition for start in starts)
+    planned = {condition: phases(config, obstacle, skill, condition) for condition in conditions}
+    return [planned[start.condition] for start in starts]
+
+
 def _follow(config: RolloutStageConfig, region: SafeSkill | None, all_phases: list[Phase], start: Start) -> Followed:
     if region is not None:
         return follow_in_region(region, start)
     transition_s = config.rollout.transition_s
-    if transition_s is None or all_phases[0].skill.field.is_onto:
+    if transition_s is None or not _is_led(config, all_phases[0].skill):
         return follow_phases(all_phases, start, config.solver)
     return follow_after_transition(all_phases, start, config.solver, transition_s)
+
+
+def _is_led(config: RolloutStageConfig, skill: Skill | ConditionalSkill) -> bool:
+    """Whether starts are led to the manifold of a decoder first."""
+    return isinstance(skill, Skill) and config.rollout.transition_s is not None and not skill.field.is_onto
+
+
+def _when_followed(config: RolloutStageConfig, skill: Skill | ConditionalSkill) -> ObstacleConfig:
+    """The obstacles where they are when a skill begins to be followed: during a transition phase they move on."""
+    return later(config.obstacle, config.rollout.transition_s or 0.0) if _is_led(config, skill) else config.obstacle
 
 
 def rollout_table(document: Mapping[str, Any]) -> str:
@@ -163,6 +188,15 @@ def _chosen_starts(
             times = np.linspace(0.0, config.duration_s or one.duration_s, config.points or len(one))
         starts.append(Start(f"demonstration {number}", one.state(_channels(skill))[0], times, one.condition))
     return starts
+
+
+def _warn_of_far(starts: Sequence[Start], demonstrated: Box) -> None:
+    reach = FAR * float((demonstrated.upper - demonstrated.lower).max()) / 2
+    for start in starts:
+        beyond = np.maximum(demonstrated.lower - start.state, start.state - demonstrated.upper)
+        if (farthest := float(beyond.max())) > reach:
+            where = f"coordinate {int(beyond.argmax())} is {farthest:.3g} beyond all that was demonstrated"
+            _log.warning("rollout: %s is far outside: %s, and the motion from there made up", start.label, where)
 
 
 def _state(start: list[float], dim: int) -> np.ndarray:

@@ -77,10 +77,7 @@ def around_obstacles(
 
 
 def grown(config: schema.ObstacleConfig, by_m: float) -> schema.ObstacleConfig:
-    """The same obstacles with everything inside them that is nearer than a length [m], for points of larger bodies.
-
-    Meshes that are not convex stay as they are.
-    """
+    """The same obstacles with everything inside them that is nearer than a length [m], for points of larger bodies."""
     match config:
         case schema.SeveralObstacles():
             return replace(config, bodies=[grown(body, by_m) for body in solids(config)])

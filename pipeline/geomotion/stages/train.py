@@ -37,6 +37,8 @@ from geomotion.training.start import mean_square_distance, start_from_data
 from geomotion.training.trainer import History, Objective, Schedule, fit
 from geomotion.training.trajectories import TrajectoryReproduction
 
+POSES = (schema.PoseSpace.R3xSO3, schema.PoseSpace.R3xS3)
+POSE_PARTS = (3, 3)  # positions and orientations are judged apart
 LEVER_BESIDE_JOINTS_M = 1.0  # so that a turn counts as much as the same turn of a joint
 
 
@@ -92,12 +94,17 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
         seen = encoded(data, decoder)
         place = Geometry.of(seen)
     field = models.build(models.of_codes(config.model), place)
+    if field.start_memory is not None:
+        field.start_memory.learn(torch.stack([states[0] for states in seen.states]))
+        seen = seen.without_offsets(field.start_memory)
     started = start_from_data(field, seen)
     if isinstance(config.training, schema.ClosedFormTraining):
         history = _closed_form(config, started, field, seen, place)
     else:
         objective = _objective(config, seen, place)
         history = fit(field, objective, _schedule(config), run.checkpoint, run.log_series)
+    if field.start_memory is not None:
+        field.begin_on_skill()
     if decoder is not None:
         field = decoded(decoder, field)
 
@@ -175,6 +182,9 @@ def _closed_form(
 
 
 def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Objective[ChartedField]:
+    if isinstance(config.model.field, schema.MovementPrimitiveField):
+        found = type(config.training).__name__.removesuffix("Training").lower()
+        raise InvalidSetting("training", found, "closed_form: a movement primitive is computed from the demonstrations")
     match config.training:
         case schema.VelocityTraining() as velocity:
             for name in ("curl_weight", "contraction_weight"):
@@ -185,7 +195,7 @@ def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Ob
         case schema.TrajectoryTraining() as trajectory:
             if not isinstance(config.model.field, schema.LinearField):
                 raise InvalidSetting("training", "trajectory", "velocity: this field has no closed-form trajectories")
-            return TrajectoryReproduction(data, geometry, trajectory)
+            return TrajectoryReproduction(data, geometry, trajectory, POSE_PARTS if config.space in POSES else None)
         case schema.AdjointTraining() as adjoint:
             return TrajectoryShooting(data, geometry, adjoint)
         case schema.LikelihoodTraining() as likelihood:

@@ -9,6 +9,7 @@ import torch
 from geomotion.config import SolverConfig
 from geomotion.dynamics.injective import decoder_of, transition
 from geomotion.errors import InvalidSetting
+from geomotion.obstacles.obstacle import clearance
 from geomotion.stages.phases import Followed, Phase, Start, follow_phases
 
 
@@ -18,7 +19,7 @@ def follow_after_transition(
     """Lead a start to the manifold, then follow the phases from there, whose clock begins then.
 
     Args:
-        all_phases: Of a skill with a decoder.
+        all_phases: Of a skill with a decoder; obstacles are where they are when the manifold is reached.
         start: Where and when.
         solver: How the motion on the manifold is computed.
         transition_s: Time until the manifold is reached [s].
@@ -40,8 +41,13 @@ def follow_after_transition(
         projected = decoder.project(state).double().numpy()
     rest = replace(start, state=projected, times=np.asarray(start.times[~during] - transition_s))
     followed = follow_phases(all_phases, rest, solver, on_manifold=True)
+    gaps = [] if followed.clearance_m is None else [followed.clearance_m]
+    if (field := all_phases[0].field) is not None:
+        before = torch.as_tensor(start.times[during] - transition_s).to(like)
+        gaps.append(float(clearance(field.obstacles, field.position(states), before)))
     return replace(
         followed,
+        clearance_m=min(gaps, default=None),
         states=torch.cat([states, followed.states]),
         velocities=torch.cat([velocities, followed.velocities]),
     )

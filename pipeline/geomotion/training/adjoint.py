@@ -36,12 +36,12 @@ class TrajectoryShooting:
         self.data = data
 
     def __call__(self, model: ChartedField, progress: float, generator: torch.Generator) -> Losses:
-        targets = self._pieces(generator)
+        targets, begin_s = self._pieces(generator)
         options: dict[str, Any] = {"rtol": self.settings.relative_tolerance, "atol": self.settings.absolute_tolerance}
         limit = {"max_num_steps": self.settings.most_solver_steps}
         try:
             states: Trajectories = odeint_adjoint(
-                _RightHandSide(model.field),
+                _RightHandSide(model, begin_s / model.time_unit_s),
                 model.chart.to_latent(targets[:, 0]),
                 self.times_s / model.time_unit_s,
                 method="dopri5",
@@ -56,25 +56,33 @@ class TrajectoryShooting:
         error_m = model.chart.to_ambient(states) - targets
         return {"trajectory": (error_m / self.scale_m).square().sum(-1).mean()}
 
-    def _pieces(self, generator: torch.Generator) -> Float[Tensor, "piece time D"]:
-        """Demonstrated states [m], by linear interpolation in time."""
-        demos = torch.randint(len(self.data.times), (self.settings.pieces,), generator=generator)
-        shares = torch.rand(self.settings.pieces, generator=generator)
-        return torch.stack([self._piece(int(demo), float(share)) for demo, share in zip(demos, shares, strict=True)])
+    def _pieces(self, generator: torch.Generator) -> tuple[Float[Tensor, "piece time D"], Float[Tensor, "piece 1"]]:
+        """Demonstrated states [m], by linear interpolation in time, and when each piece begins [s]."""
+        demos = torch.randint(len(self.data.times), (self.settings.pieces,), generator=generator).tolist()
+        last_s = torch.stack([self.data.times[demo][-1] for demo in demos])
+        begin_s = torch.rand(self.settings.pieces, generator=generator) * (last_s - self.duration_s)
+        pieces = [self._piece(demo, float(begin)) for demo, begin in zip(demos, begin_s, strict=True)]
+        return torch.stack(pieces), begin_s[:, None]
 
-    def _piece(self, demo: int, share: float) -> States:
+    def _piece(self, demo: int, begin_s: float) -> States:
         times, states = self.data.times[demo].numpy(), self.data.states[demo].numpy()
-        wanted = share * (times[-1] - self.duration_s) + self.times_s.numpy()
+        wanted = begin_s + self.times_s.numpy()
         return torch.as_tensor(np.stack([np.interp(wanted, times, column) for column in states.T], -1)).float()
 
 
 class _RightHandSide(nn.Module):
-    """A field as torchdiffeq wants it; a module, so that its parameters are found."""
+    """Latent velocities as torchdiffeq wants them; a module, so that parameters of field and time law are found.
 
-    def __init__(self, field: Any) -> None:
+    Args:
+        model: The field behind its chart.
+        begin: When each of a batch of motions is where it starts here, in units of T since its own start.
+    """
+
+    def __init__(self, model: ChartedField, begin: Float[Tensor, "piece 1"]) -> None:
         super().__init__()
-        self.field = field
+        self.field: Any = model.field
+        self.time_law = model.time_law
+        self.paced, self.law_at, self.begin = model.paced, model.law_at, begin
 
-    def forward(self, t: Tensor, x: Tensor) -> Tensor:
-        velocity: Tensor = self.field(x)
-        return velocity
+    def forward(self, t: Tensor, z: Tensor) -> Tensor:
+        return self.paced(self.field(z), self.begin + t, self.law_at(z))

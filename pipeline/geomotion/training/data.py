@@ -7,6 +7,7 @@ import numpy as np
 import torch
 
 from geomotion.demos.demonstrations import Demonstrations
+from geomotion.dynamics.start_memory import StartMemory
 from geomotion.scores.grids import bounding_box
 from geomotion.types import Float, Int, States, Tensor
 
@@ -42,6 +43,16 @@ class TrainingSet:
         """Only these demonstrations."""
         parts = (self.times, self.states, self.velocities)
         return TrainingSet(*(tuple(part[demo] for demo in demos) for part in parts))
+
+    def without_offsets(self, memory: StartMemory) -> "TrainingSet":
+        """What is left of demonstrations without what their starts carry along: they all begin at the mean start."""
+        carried = [memory.carried(states[0]) for states in self.states]
+        every = list(zip(carried, self.times, self.states, self.velocities, strict=True))
+        return TrainingSet(
+            self.times,
+            tuple(states - one.along(times) for one, times, states, _ in every),
+            tuple(velocities - one.velocity(times[:, None]) for one, times, _, velocities in every),
+        )
 
     @property
     def all_states(self) -> Float[Tensor, "point D"]:

@@ -1,6 +1,8 @@
 """Fitting whole trajectories of a field that is solvable in closed form: no solver, no unrolling."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import numpy as np
 import torch
@@ -61,10 +63,16 @@ class TrajectoryReproduction:
         data: Demonstrations.
         geometry: Their size and duration.
         settings: Weights and sample sizes.
+        parts: Coordinates of each part of a state, such as position and orientation: curves are compared by the nearest
+            points of each part; None: of whole states.
     """
 
-    def __init__(self, data: TrainingSet, geometry: Geometry, settings: TrajectoryTraining) -> None:
+    def __init__(
+        self, data: TrainingSet, geometry: Geometry, settings: TrajectoryTraining, parts: Sequence[int] | None = None
+    ) -> None:
         self.settings = settings
+        ends = [data.states[0].shape[1]] if parts is None else list(accumulate(parts))
+        self.parts = [slice(*bounds) for bounds in pairwise([0, *ends])]
         self.scale_m = geometry.scale_m
         self.duration_s = geometry.duration_s
         self.centre = torch.tensor(geometry.centre)
@@ -109,7 +117,10 @@ class TrajectoryReproduction:
         paths = [model.flow(latent_starts, samples.times, model.law_at(samples.starts), samples.begin).flatten(0, 2)]
         if curve_term:
             law = model.law_at(followed.states[:, 0])
-            paths.append(model.flow(latent_starts[:, first], curve_times, law).flatten(0, 1))
+            begun = latent_starts[:, first]
+            if isinstance(field, EmbeddedField) and model.start_memory is not None:
+                begun = field.project(begun)  # undisturbed motions stay on the skill's manifold
+            paths.append(model.flow(begun, curve_times, law).flatten(0, 1))
         count = sum(map(len, paths))
         if isinstance(field, EmbeddedField):
             paths.append(field.project(z[:shown] - image))
@@ -205,6 +216,10 @@ class TrajectoryReproduction:
         return curves.at(index)[0]
 
     def _nearest_point(self, curve: Float[Tensor, "demo k D"], demonstration: Float[Tensor, "demo m D"]) -> Tensor:
+        losses = [self._nearest_point_of(curve[..., part], demonstration[..., part]) for part in self.parts]
+        return torch.stack(losses).sum()
+
+    def _nearest_point_of(self, curve: Float[Tensor, "demo k d"], demonstration: Float[Tensor, "demo m d"]) -> Tensor:
         with torch.no_grad():
             distance = torch.cdist(curve, demonstration)
             to_demonstration, to_curve = distance.argmin(2), distance.argmin(1)

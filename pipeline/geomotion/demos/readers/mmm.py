@@ -85,22 +85,28 @@ def chosen_motion(path: Path, name: str | None) -> Motion:
 
 
 def read_skeleton(config: MmmDataset, demonstrations: Demonstrations) -> Skeleton | None:
-    """The model of the recorded person, as tall as it is [m]; None where no file of it is beside the recording.
+    """The model of the recorded person, as tall as it is [m]; None where no usable file of it is beside the recording.
 
     Raises:
         MissingData: If `dataset.skeleton` does not exist.
-        DatasetError: If the file is no model, has none of the recorded joints, or nothing says how tall the person is.
+        DatasetError: If it is no model, has none of the recorded joints, or nothing says how tall the person is. Of a
+            file that merely lies beside the recording, this is a warning.
     """
     recording = Path(config.path).expanduser()
     motion = chosen_motion(recording, config.motion)
     if config.skeleton is not None:
-        path = Path(config.skeleton).expanduser()
-    else:
-        names = [name for name in (Path(motion.model).name, *MODEL_FILES) if name not in ("", recording.name)]
-        found = [recording.with_name(name) for name in names if recording.with_name(name).is_file()]
-        if not found:
-            return None
-        path = found[0]
+        return _skeleton(Path(config.skeleton).expanduser(), config, motion, demonstrations)
+    names = [name for name in (Path(motion.model).name, *MODEL_FILES) if name not in ("", recording.name)]
+    for path in (recording.with_name(name) for name in names if recording.with_name(name).is_file()):
+        try:
+            return _skeleton(path, config, motion, demonstrations)
+        except DatasetError as error:
+            _log.warning("%s: the person is not drawn by it", error)
+    return None
+
+
+def _skeleton(path: Path, config: MmmDataset, motion: Motion, demonstrations: Demonstrations) -> Skeleton:
+    recording = Path(config.path).expanduser()
     height_m = config.height_m or motion.height_m
     if height_m is None:
         raise DatasetError(recording, "does not say how tall the person is; set dataset.height_m= to draw the skeleton")

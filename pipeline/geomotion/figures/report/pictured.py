@@ -77,7 +77,7 @@ def confusion_listing(embedded: Mapping[str, Any]) -> Listing:
     """How often each place is taken for which."""
     confusion = embedded["held_out"]["confusion"]
     names = [f"place {number}" for number in range(1, len(confusion) + 1)]
-    if len(confusion) > 3:
+    if embedded["knows_elsewhere"]:
         names[-1] = "elsewhere"
     columns = (Column("picture of", is_text=True), *(Column(f"taken for {name}") for name in names))
     rows = tuple((name, *map(str, row)) for name, row in zip(names, confusion, strict=True))
