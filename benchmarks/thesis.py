@@ -72,12 +72,12 @@ FIT = ("train.dtwd_per_point", "heldout.dtwd_per_point", "contraction.*.non_cont
 FOLLOWED = (
     "train.dtwd_per_point", "train.*ion_dtwd", "heldout.dtwd_per_point", "heldout.*ion_dtwd", "pushes.*", "obstacles.*",
 )  # fmt: skip
-PLANNED = ("heldout.*dtwd*", "heldout.planned_share", "pairs.planned_share")
+PLANNED = ("heldout.planned_share", "pairs.planned_share", "heldout.*_dtwd_ratio", "heldout.*_ratio_of_averaged_demo")
 EXPERIMENTS = (
     _gms("fig_3_1", *PLANNED, small=("dataset.demos=6",)),
     _gms("fig_3_3", "methods.*", *PLANNED, small=("dataset.demos=6",)),
-    _gms("fig_3_6", *PLANNED, "energy.*"),
-    _gms("fig_3_7", *PLANNED, "energy.*"),
+    _gms("fig_3_6", *PLANNED),
+    _gms("fig_3_7", *PLANNED),
     _gms("fig_3_8", *PLANNED, small=("dataset.demos=12", "dataset.points=60")),
     _gms("fig_3_9", *PLANNED, small=("dataset.demos=12", "dataset.points=60")),
     _gms("fig_4_1", *PLANNED),

@@ -47,7 +47,7 @@ def test_the_bound_improves_and_states_are_reconstructed(data, trained):
     assert history.rows[-1]["total"] < 0.1 * history.rows[0]["total"]
 
     def missed(one: DecoderChart) -> float:
-        return float((one.project(data.all_states) - data.all_states).norm(dim=-1).mean())
+        return float((one.project(data.all_states) - data.all_states).norm(dim=-1).mean().detach())
 
     assert missed(decoder) < 0.25 * missed(new_decoder(data))
 
