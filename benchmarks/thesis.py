@@ -83,7 +83,7 @@ EXPERIMENTS = (
     _gms("fig_4_1", *PLANNED),
     _gms("fig_4_3", *PLANNED),
     _gms("fig_4_4", "arm_failures.*", *PLANNED),
-    _gms("fig_4_5", "switching.*", *PLANNED, small=("graph.points_per_axis=20",)),
+    _gms("fig_4_5", "heldout.group_switches", "heldout.jerk", *PLANNED, small=("graph.points_per_axis=20",)),
     _gms("fig_4_7a", *PLANNED, small=("graph.points_per_axis=20",)),
     _gms("fig_4_7b", *PLANNED, small=("graph.points_per_axis=20",)),
     _gms("fig_4_7c", *PLANNED, small=("graph.points_per_axis=20",)),
