@@ -38,6 +38,17 @@ def check_orientations(demonstrations: Demonstrations) -> None:
         )
 
 
+def continuous_in_sign(quaternions: Array, near: Array) -> Array:
+    """The same rotations, each quaternion of the sign nearer to the one before it, shape (time, 4).
+
+    Args:
+        quaternions: Shape (time, 4).
+        near: One that the first is near to, shape (4,).
+    """
+    turns = np.einsum("ti,ti->t", quaternions, np.concatenate([near[None], quaternions[:-1]]))
+    return np.asarray(quaternions * np.cumprod(np.where(turns < 0, -1.0, 1.0))[:, None])
+
+
 def _refuse_jump(name: str, number: int, trajectory: Trajectory) -> None:
     values = _unit(trajectory.channels[ORIENTATION])
     steps = _angles(values[1:], values[:-1])

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from geomotion.figures.latent import label_latent
+from geomotion.figures.policy_replay import PUSHED
 from geomotion.figures.safety import draw_region
 from geomotion.figures.style import COLOUR, limit_to, new_figure, paper_style, save_figure
 
 WIDTH_MM, HEIGHT_MM = 120.0, 125.0
-PUSHED = "#B2182B"
 
 
 @dataclass(frozen=True)

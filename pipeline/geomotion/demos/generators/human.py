@@ -10,16 +10,13 @@ Source:
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from geomotion.config import GeneratedDataset
 from geomotion.demos.demonstrations import Array, Trajectory
+from geomotion.demos.orientations import continuous_in_sign
 from geomotion.errors import InvalidSetting
-
-if TYPE_CHECKING:
-    from scipy.spatial.transform import Rotation
 
 Quaternion = tuple[float, float, float, float]  # w, x, y, z
 
@@ -133,7 +130,11 @@ def repeat(intent: Intent, habits: Habits, config: GeneratedDataset, number: int
     now = np.interp(minimum_jerk(np.linspace(0.0, 1.0, config.points)), passed, way)
     rotation = Rotation.from_rotvec(_at(now, way, wobble)) * Rotation.from_rotvec(_at(now, way, turns)) * start
     time_s = np.linspace(0.0, duration_s, config.points)
-    return time_s, _at(now, way, places), _continuous(rotation, np.array(intent.start_wxyz))
+    return (
+        time_s,
+        _at(now, way, places),
+        continuous_in_sign(rotation.as_quat(scalar_first=True), np.array(intent.start_wxyz)),
+    )
 
 
 def turned(wxyz: Quaternion, *turns_rad: tuple[float, float, float]) -> Quaternion:
@@ -189,10 +190,3 @@ def wander(way: Array, spread: Spread, generator: np.random.Generator, axes: int
 
 def _at(now: Array, way: Array, values: Array) -> Array:
     return np.stack([np.interp(now, way, axis) for axis in values.T], axis=1)
-
-
-def _continuous(rotation: "Rotation", first_wxyz: Array) -> Array:
-    """Quaternions, scalar first, each of the sign nearer to the one before it, shape (time, 4)."""
-    q = rotation.as_quat(scalar_first=True)
-    turns = np.einsum("ti,ti->t", q, np.concatenate([first_wxyz[None], q[:-1]]))
-    return np.asarray(q * np.cumprod(np.where(turns < 0, -1.0, 1.0))[:, None])

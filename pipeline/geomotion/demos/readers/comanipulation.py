@@ -10,8 +10,9 @@ import numpy as np
 
 from geomotion.config import CoManipulationDataset
 from geomotion.demos.demonstrations import Array, Demonstrations, Trajectory, validate
-from geomotion.demos.readers.downloads import fetched, named_folder
-from geomotion.errors import DatasetError, MissingData
+from geomotion.demos.orientations import continuous_in_sign
+from geomotion.demos.readers.downloads import recording
+from geomotion.errors import DatasetError
 
 FOLDER_VARIABLE = "COMANIPULATION_DATA_DIR"
 COMMIT = "ff7ba9eef7921a252aed1ea6891be8c922c713c1"
@@ -70,8 +71,7 @@ def facing(position_m: Array, reach_m: float = FACING_M) -> Array:
     yaw = np.unwrap(np.arctan2(*(ahead - behind)[:, 1::-1].T))
     down = Rotation.from_rotvec([np.pi, 0.0, 0.0])
     wxyz = (Rotation.from_rotvec(np.outer(yaw, [0.0, 0.0, 1.0])) * down).as_quat(scalar_first=True)
-    same = np.einsum("ti,ti->t", wxyz, np.concatenate([wxyz[:1], wxyz[:-1]]))
-    return np.asarray(wxyz * np.cumprod(np.where(same < 0, -1.0, 1.0))[:, None])
+    return continuous_in_sign(wxyz, wxyz[0])
 
 
 def _stroke(recorded_m: Array, config: CoManipulationDataset, path: Path, number: int) -> Trajectory:
@@ -112,15 +112,10 @@ def _load(path: Path) -> list[Array]:
 
 
 def _find(config: CoManipulationDataset) -> Path:
-    url = f"{FOLDER_URL}/{config.symbol}/{FILE}"
-    how_to_get = f"Get {url} and set dataset.root= or {FOLDER_VARIABLE} to its folder."
-    folder = named_folder(config.root, FOLDER_VARIABLE)
-    if folder is None:
-        what = f"symbol {config.symbol} of the Panda Co-Manipulation Dataset"
-        return fetched(url, SHA256[config.symbol], f"comanipulation/{config.symbol}/{FILE}", what, how_to_get)
-    if not (folder / FILE).is_file():
-        raise MissingData(f"{folder / FILE} (Panda Co-Manipulation Dataset)", how_to_get)
-    return folder / FILE
+    place = f"{config.symbol}/{FILE}"
+    what = f"symbol {config.symbol} of the Panda Co-Manipulation Dataset"
+    sha256 = SHA256.get(config.symbol)
+    return recording(config.root, FOLDER_VARIABLE, f"{FOLDER_URL}/{place}", sha256, f"comanipulation/{place}", what)
 
 
 def _at(now: Array, known: Array, values: Array) -> Array:

@@ -9,30 +9,39 @@ from geomotion.errors import DatasetError, MissingData
 TIMEOUT_S = 10.0
 
 
-def named_folder(root: str | None, variable: str) -> Path | None:
-    """Folder of recordings that are here already: the setting, or else the environment variable; None for neither."""
-    named = root or os.environ.get(variable)
-    return Path(named).expanduser() if named else None
-
-
-def fetched(url: str, sha256: str, path_in_cache: str, what: str, how_to_get: str) -> Path:
-    """The file in the user's cache.
+def recording(root: str | None, variable: str, url: str, sha256: str | None, cache: str, what: str) -> Path:
+    """A file that is here already, or else is fetched.
 
     Args:
-        url: Where it was published.
-        sha256: Its checksum.
-        path_in_cache: Folder and name below this program's cache.
+        root: Its folder; None: the one that an environment variable names, if that is set.
+        variable: Name of that variable.
+        url: Where it was published, under the same name.
+        sha256: Its checksum; None: it is not fetched.
+        cache: Where it is kept below this program's cache.
         what: Its name, for people.
-        how_to_get: What to do without a connection.
 
     Raises:
-        MissingData: If it is not in the cache and cannot be downloaded.
+        MissingData: If it is not in the folder, or cannot be downloaded.
         DatasetError: If what came is not what was published.
     """
+    how_to_get = f"Get {url} and set dataset.root= or {variable} to its folder."
+    named = root or os.environ.get(variable)
+    if named:
+        path = Path(named).expanduser() / url.rpartition("/")[2]
+        if not path.is_file():
+            raise MissingData(f"{path} ({what})", how_to_get)
+        return path
+    if sha256 is None:
+        raise MissingData(what, how_to_get)
+    return _fetched(url, sha256, cache, what, how_to_get)
+
+
+def _fetched(url: str, sha256: str, cache: str, what: str, how_to_get: str) -> Path:
+    """The file in the user's cache."""
     import pooch
 
     pooch.get_logger().setLevel(logging.WARNING)
-    path = Path(pooch.os_cache("geomotion")) / path_in_cache
+    path = Path(pooch.os_cache("geomotion")) / cache
     try:
         found = pooch.retrieve(
             url,

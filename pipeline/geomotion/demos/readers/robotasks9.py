@@ -6,8 +6,8 @@ import numpy as np
 
 from geomotion.config import RoboTasks9Dataset
 from geomotion.demos.demonstrations import Array, Demonstrations, Trajectory, validate
-from geomotion.demos.readers.downloads import fetched, named_folder
-from geomotion.errors import DatasetError, MissingData
+from geomotion.demos.readers.downloads import recording
+from geomotion.errors import DatasetError
 
 METRES_PER_UNIT = 1e-2  # the source states no unit; centimetres put every pose within the Panda's reach
 FOLDER_VARIABLE = "ROBOTASKS9_DATA_DIR"
@@ -65,11 +65,6 @@ def _load(path: Path) -> Array:
 
 def _find(config: RoboTasks9Dataset) -> Path:
     name = f"{config.task}.npy"
-    how_to_get = f"Get {FOLDER_URL}/{name} and set dataset.root= or {FOLDER_VARIABLE} to its folder."
-    folder = named_folder(config.root, FOLDER_VARIABLE)
-    if folder is None:
-        what = f"RoboTasks9 task {config.task!r}"
-        return fetched(f"{FOLDER_URL}/{name}", SHA256[config.task], f"robotasks9/{name}", what, how_to_get)
-    if not (folder / name).is_file():
-        raise MissingData(f"{folder / name} (RoboTasks9)", how_to_get)
-    return folder / name
+    what = f"RoboTasks9 task {config.task!r}"
+    sha256 = SHA256.get(config.task)
+    return recording(config.root, FOLDER_VARIABLE, f"{FOLDER_URL}/{name}", sha256, f"robotasks9/{name}", what)
