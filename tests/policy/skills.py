@@ -38,6 +38,7 @@ def skill_of(
             parameter.add_(0.1 * torch.randn(parameter.shape, generator=generator))
         if field.start_memory is not None:
             field.start_memory.learn(states_of(dim, 5))
+            field.start_memory.remainder.fit(0.1 * SIZE_M * torch.randn(9, dim, generator=generator))
     return Skill(field.eval(), config, geometry, channels, (0,), (), pose)
 
 

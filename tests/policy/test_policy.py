@@ -42,7 +42,8 @@ def test_a_start_that_is_told_is_remembered():
     skill, states = pose_skill(REMEMBERING), states_of(6)
     policy, told, elapsed_s = policy_of(skill), measured(skill, states), torch.full((20, 1), 0.7)
     start = {f"start_{name}": values[:1] for name, values in told.items()}
-    for asked, field in ((start, skill.field.begun(states[:1])), ({}, skill.field)):
+    mean_start = skill.field.start_memory.mean_start[None]
+    for asked, field in ((start, skill.field.begun(states[:1])), ({}, skill.field.begun(mean_start))):
         twist = skill.pose.twist(states, field.velocity(states, elapsed_s))
         answer = ask(policy, **told, **asked, elapsed_s=elapsed_s)
         assert_close(answer["velocity_m_per_s"], twist.velocity, rtol=1e-4, atol=1e-5)

@@ -7,11 +7,15 @@ from geomotion import config as schema
 from geomotion import models
 from geomotion.demos import readers, storage
 from geomotion.demos.preprocessing import preprocess
+from geomotion.dynamics.rollout import rollout
+from geomotion.dynamics.start_memory import StartMemory
 from geomotion.errors import InvalidSetting
 from geomotion.files import read_json
 from geomotion.models import ModelConfig
 from geomotion.stages.train import TrainConfig, train
 from geomotion.tracking import Artefacts, StageRun
+from geomotion.training.data import TrainingSet
+from geomotion.training.nearest_path import one_path as nearest_path_of
 
 LETTERS = schema.LettersDataset(name="letters/s", letter="s", demos=3, points=40)
 LINEAR = ModelConfig(schema.IdentityChart(), schema.LinearField(), schema.NoRegulariser(), 0)
@@ -61,6 +65,25 @@ def test_every_loss_is_kept_and_the_model_can_be_read(ingested, run):
     skill = models.load(run.folder / "model.pt")
     assert skill.config == LINE_INTEGRAL
     assert torch.isfinite(skill.field(skill.goal)).all()
+
+
+@pytest.mark.parametrize("one_path", [True, False])
+def test_a_skill_of_one_dimension_follows_the_path_nearest_to_what_was_shown_however_short_the_training(
+    ingested, run, one_path
+):
+    field = schema.LinearField(skill_dim=1, start_fade_durations=1.0)
+    model = ModelConfig(schema.FlowChart(layers=2), field, schema.NoRegulariser(), 0, schema.LearnedTimeLaw())
+    train(TrainConfig(LETTERS, model, schema.TrajectoryTraining(steps=4, one_path=one_path), 0), ingested, run)
+    skill = models.load(run.folder / "model.pt")
+    memory, channels = skill.field.start_memory, skill.state_channels
+    data = TrainingSet.from_demonstrations(storage.load(ingested["ingest"].folder), channels).select(skill.train_demos)
+    shown = StartMemory(2, float(memory.fade_s))
+    shown.learn(torch.stack([states[0] for states in data.states]))
+    path, _ = nearest_path_of(data.without_offsets(shown), skill.geometry)
+    times = torch.linspace(0, skill.geometry.duration_s, len(path))
+    motion = rollout(skill.field, memory.mean_start[None], times).states[0]
+    apart = (motion - path).norm(dim=-1) / skill.geometry.scale_m
+    assert (float(apart[10:-10].mean()) < 0.01) is one_path
 
 
 PRIMITIVE = ModelConfig(schema.IdentityChart(), schema.MovementPrimitiveField(), schema.NoRegulariser(), 0)

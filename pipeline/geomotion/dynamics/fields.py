@@ -10,6 +10,8 @@ from geomotion.dynamics.start_memory import CarriedOffset, StartMemory
 from geomotion.dynamics.time_law import Clock, ConditionalTimeLaw, LaterTimeLaw, TimeLaw
 from geomotion.types import Float, Latent, State, Tensor, Trajectories, Velocity
 
+HELD = 0.5  # of the duration, where a path has ended and a motion may not have
+
 PushForward = Callable[[Tensor], Tensor]
 
 
@@ -127,7 +129,7 @@ class ChartedField(nn.Module):
         transverse_law: The clock of the coordinates beyond those of the skill, where `field` is an embedded one; None:
             θ is theirs as well.
         start_memory: What :meth:`begun` makes of starts; None: they are states like any other.
-        carried: s(t) δ of motions whose starts are known, for which ẋ = f(x - s δ, t) + ṡ δ; None: of none.
+        carried: c(t) of motions whose starts are known, for which ẋ = f(x - c, t) + ċ; None: of none.
     """
 
     def __init__(
@@ -230,11 +232,29 @@ class ChartedField(nn.Module):
     @torch.no_grad()
     def begin_on_skill(self) -> None:
         """Move the mean start to where z_e vanishes: then only what disturbs a motion is beside the skill."""
-        memory, field = self.start_memory, self.field
-        assert memory is not None and isinstance(field, SkillField)
-        z = self.chart.to_latent(memory.mean_start)
-        z[field.skill_dim :] = 0
-        memory.mean_start.copy_(self.chart.to_ambient(z))
+        assert self.start_memory is not None
+        self.start_memory.mean_start.copy_(self._on_skill(self.start_memory.mean_start))
+
+    @torch.no_grad()
+    def carry_to(self, path: Float[Tensor, "point D"]) -> None:
+        """Let the motion from the mean start be a path that begins there, given at equal times over the mean duration.
+
+        What the motion on the skill lacks of it is carried along. Where the path ends, the motion may still be on its
+        way to the goal; that is carried for `HELD` of the duration more.
+        """
+        memory = self.start_memory
+        assert memory is not None
+        held = path[-1:].expand(round(HELD * (len(path) - 1)), -1)
+        times = torch.arange(len(path) + len(held), dtype=path.dtype) * (self.time_unit_s / (len(path) - 1))
+        motion = self.forgetful().solve(self._on_skill(memory.mean_start), times)
+        memory.carry(torch.cat([path, held]) - motion, float(times[-1]))
+
+    def _on_skill(self, x: State) -> State:
+        """The state with the same skill coordinates on the manifold where all others vanish."""
+        assert isinstance(self.field, SkillField)
+        z = self.chart.to_latent(x).clone()
+        z[..., self.field.skill_dim :] = 0
+        return self.chart.to_ambient(z)
 
     def forgetful(self) -> "ChartedField":
         """The same field without a memory of starts."""

@@ -46,9 +46,7 @@ class RadialCover:
 
     def to_flat(self, inside: Vector) -> Vector:
         share = inside.norm(dim=-1, keepdim=True) / self.radius
-        ratio = torch.where(
-            share < 1e-4, 1 + share.square() / 3, torch.atanh(share) / torch.where(share == 0, 1, share)
-        )
+        ratio = torch.where(share < 1e-4, 1 + share.square() / 3, _atanh(share) / torch.where(share == 0, 1, share))
         return inside * ratio
 
     def push(self, flat: Vector, tangent: Vector) -> Vector:
@@ -87,7 +85,7 @@ class CubeCover:
 
     def to_flat(self, inside: Vector) -> Vector:
         ball = inside / self.radius
-        return self.radius * torch.atanh(ball / _ratio(ball))
+        return self.radius * _atanh(ball / _ratio(ball))
 
     def push(self, flat: Vector, tangent: Vector) -> Vector:
         box = (flat / self.radius).tanh()
@@ -98,6 +96,13 @@ class CubeCover:
         falling = ratio * (box * tangent).sum(-1, keepdim=True) / length.square()
         pushed: Tensor = ratio * tangent + (rising - falling) * box
         return pushed
+
+
+def _atanh(x: Tensor) -> Tensor:
+    """Runtimes of exported policies know it in single precision alone, where logarithms would not do."""
+    if x.dtype == torch.float32:
+        return x.atanh()
+    return ((1 + x).log() - (1 - x).log()) / 2
 
 
 def _ratio(x: Vector) -> Float[Tensor, "*batch 1"]:

@@ -80,7 +80,7 @@ class PoseCoordinates(nn.Module):
 
     def turned_from_reference(self, orientation: Orientations) -> Positions:
         """The rotation vector from the reference to orientations [rad]."""
-        turned = product(orientation, inverse(self.reference))
+        turned = product(orientation, inverse(self.reference.to(orientation)))
         if self.group == "SO3":
             turned = torch.where(turned[..., :1] < 0, -turned, turned)
         return rotation_vector(turned)

@@ -23,7 +23,7 @@ def rotation_vector(quaternion: Quaternion) -> RotationVector:
     """
     scalar, vector = quaternion[..., :1], quaternion[..., 1:]
     sine = vector.norm(dim=-1, keepdim=True)
-    angle = 2 * torch.atan2(sine, scalar)
+    angle = 2 * _angle(sine, scalar)
     # near the identity, angle/sine is 2/scalar (1 - tan²/3); near its antipode it has no limit
     tangent = sine / torch.where(scalar == 0, 1, scalar)
     near = (sine < SMALL) & (scalar > 0)
@@ -77,6 +77,16 @@ def mean_quaternion(quaternions: Float[Tensor, "point 4"]) -> Float[Tensor, " 4"
     mean = axes[:, -1]
     signed: Tensor = mean * torch.where(mean[0] < 0, -1.0, 1.0).to(mean)
     return signed
+
+
+def _angle(sine: Tensor, cosine: Tensor) -> Tensor:
+    """Of both, in (-π, π].
+
+    A runtime of exported policies may know arctangents in single precision alone; one step of Newton's method from
+    there has an error of the third order.
+    """
+    rough = torch.atan2(sine.float(), cosine.float()).to(sine)
+    return rough + sine * rough.cos() - cosine * rough.sin()
 
 
 def _sinc(angle: Tensor) -> Tensor:

@@ -43,6 +43,8 @@ class Policy(nn.Module):
     ) -> None:
         super().__init__()
         plain = skill if isinstance(skill, Skill) else skill.augmented
+        if isinstance(plain.field.field, SafeField):  # velocities change by their size within millimetres of a border
+            plain = replace(plain, field=deepcopy(plain.field).double())
         self.conditional = None if isinstance(skill, Skill) else ConditionalPolicy(skill)
         self.field = plain.field
         self.pose = None if plain.pose is None else deepcopy(plain.pose).float()
@@ -57,6 +59,15 @@ class Policy(nn.Module):
         self.inputs = tuple(self._inputs())
         self.outputs = tuple(self._outputs())
 
+    def float(self) -> "Policy":
+        """Everything in single precision but a field with a safety region."""
+        if self.safe is None:
+            return super().float()
+        for name, child in self.named_children():
+            if name not in ("field", "embedded", "safe"):
+                child.float()
+        return self
+
     @property
     def has_manifold(self) -> bool:
         """Whether the skill has fewer dimensions than its states."""
@@ -65,11 +76,12 @@ class Policy(nn.Module):
     def forward(self, *inputs: Tensor) -> tuple[Tensor, ...]:
         """Values of :attr:`outputs` from those of :attr:`inputs`, in their order."""
         given = dict(zip((one.name for one in self.inputs), inputs, strict=True))
-        x, is_rotation = self._state(given)
+        exact, is_rotation = self._state(given)
+        x = exact.to(inputs[0].dtype)
         conditions = [given[ports.CONDITION]] if self.conditional is not None else []
         stretch, slowdown = self._units(given)
-        z, velocity = self._velocity(x, given, stretch, slowdown)
-        velocities = self._around_obstacle(x, velocity, given)
+        z, velocity = self._velocity(exact, given, stretch, slowdown)
+        velocities = self._around_obstacle(x, velocity.to(x.dtype), given)
         is_defined = torch.cat(velocities, -1).isfinite().all(-1) & is_rotation
         is_inside = self.training_range.contains(x, conditions)
         status = torch.where(is_defined, torch.where(is_inside, Status.ok, Status.outside), Status.undefined)
@@ -79,18 +91,19 @@ class Policy(nn.Module):
         if self.safe is not None:
             region = self.safe.region
             told.append(region.distance(z[..., :PLANE]).clamp(max=region.levels.inactive))
-        return (*trusted, status, *told)
+        return (*trusted, status, *(one.to(x.dtype) for one in told))
 
     def _state(self, given: Mapping[str, Tensor], when: str = "") -> tuple[State, Bool[Tensor, "*batch"]]:
-        """x, now or at the start, and whether its orientation is a rotation."""
+        """x, now or at the start, in the precision of the field, and whether its orientation is a rotation."""
+        precision = next((one.dtype for one in self.field.parameters()), torch.float32)
         if self.pose is None:
-            x = given[when + self.inputs[0].name]
+            x = given[when + self.inputs[0].name].to(precision)
             return x, torch.ones_like(x[..., 0], dtype=torch.bool)
-        orientation = given[when + ports.ORIENTATION]
+        orientation = given[when + ports.ORIENTATION].to(precision)
         length = orientation.norm(dim=-1, keepdim=True)
-        x = self.pose.to_vector(given[when + ports.POSITION], orientation / length)
+        x = self.pose.to_vector(given[when + ports.POSITION].to(precision), orientation / length)
         if self.joints:
-            x = torch.cat([given[when + ports.JOINTS], x], dim=-1)
+            x = torch.cat([given[when + ports.JOINTS].to(precision), x], dim=-1)
         return x, ((length - 1).abs() < ROTATION_TOLERANCE)[..., 0]
 
     def _units(self, given: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
@@ -104,6 +117,7 @@ class Policy(nn.Module):
     ) -> tuple[Tensor, Velocity]:
         """Latent state, with the code of a condition behind it, and ẋ."""
         field, augmented = self.field, x
+        given = {name: value.to(x.dtype) for name, value in given.items()}
         carried = None
         if field.start_memory is not None:
             carried = field.start_memory.carried(self._state(given, ports.START)[0])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,8 @@ def judge_among_obstacles(
 ) -> Evaluation:
     """Contraction, nearby rollouts, and passage to the goal; nothing in free space.
 
-    Contraction is judged at mean speed and where obstacles are at time zero.
+    Contraction is judged at mean speed and where obstacles are at time zero. A skill that remembers starts does so on
+    its way to the goal; nearby rollouts are of motions that remember the same one.
 
     Raises:
         InvalidSetting: If an obstacle does not fit the skill.
@@ -47,9 +49,12 @@ def judge_among_obstacles(
     steady = modulated(obstacle, replace(skill, field=ChartedField(chart, skill.field.field, skill.field.time_unit_s)))
     assert steady is not None
     array, options = ArrayField(skill.field), _options(solver)
+    forgetful = replace(skill, field=skill.field.forgetful())
 
-    def roll(starts: NDArray[np.float64], times_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        found = rollout_among_obstacles(field, array.tensor(starts), array.tensor(times_s), **options)
+    def rolled(own: Skill, starts: NDArray[np.float64], times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        among = modulated(obstacle, own)
+        assert among is not None
+        found = rollout_among_obstacles(among, array.tensor(starts), array.tensor(times_s), **options)
         return np.asarray(found.states.double().numpy())
 
     def free(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -69,10 +74,10 @@ def judge_among_obstacles(
             judge_modulated_contraction(steady, chart, array.tensor(grid.points), grid.note)
             if skill.field.is_onto
             else Evaluation(omitted={"obstacles.contraction": "the claimed metric is one of the decoder's manifold"}),
-            judge_modulated_nearby(roll, array.to_claimed, free(nearby), time_s),
+            judge_modulated_nearby(partial(rolled, forgetful), array.to_claimed, free(nearby), time_s),
             judge_passage(
                 field,
-                array.tensor(roll(outside, times_s)),
+                array.tensor(rolled(skill.begun(outside), outside, times_s)),
                 array.tensor(times_s),
                 skill.goal,
                 settings.goal_tolerance * tight.diagonal,

@@ -1,0 +1,94 @@
+"""The path that a skill of one dimension has to be: the one that is nearest to all demonstrations."""
+
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
+
+import numpy as np
+import torch
+from scipy.interpolate import BSpline
+
+from geomotion.training.data import Geometry, TrainingSet
+from geomotion.types import Float, States, Tensor
+
+POINTS = 121  # at which paths are compared
+FINE, COARSE = 32, 12  # control points: of the mean of the demonstrations, and of how the path departs from it
+STEPS = 400
+LEARNING_RATE = 0.015  # in sizes of the demonstrations
+SYNCHRONY = 0.07  # weight of distances at equal times: a path must not wait where demonstrations agree
+EXCESS = 0.2  # weight of what is longer than a demonstration: nor visit the end of each of them
+
+
+def nearest_path(curves: Float[Tensor, "demo point D"], parts: Sequence[slice]) -> Float[Tensor, "point D"]:
+    r"""A path from the mean start to the mean end, with the least mean distance to curves.
+
+    .. math::
+        \sum_p \operatorname{mean}_i \left( d_p(m, x_i) + \tfrac{1}{5} (\ell_p(m) - \bar\ell_p)_+ \right)
+        + \tfrac{7}{100} \operatorname{mean}_{i, t} \|m(t) - x_i(t)\|
+
+    d_p is the mean distance of the points of each curve to the nearest of the other, of the part p of the coordinates;
+    ℓ_p is the length. Distances and not their squares: the path goes where most demonstrations do, as a median.
+
+    Args:
+        curves: At equal shares of their durations, in units of their size.
+        parts: Coordinates that are compared apart, such as position and orientation.
+    """
+    curves = curves.double()
+    mean = curves.mean(0)
+    fine, coarse = (torch.from_numpy(_b_splines(len(mean), count)) for count in (FINE, COARSE))
+    smooth = fine @ torch.linalg.lstsq(fine, mean).solution
+    share = torch.linspace(0, 1, len(mean), dtype=torch.float64)[:, None]
+    smooth = smooth + torch.lerp(mean[0] - smooth[0], mean[-1] - smooth[-1], share)
+    lengths = [_length(curves[..., part]).mean() for part in parts]
+    departure = torch.zeros(COARSE - 2, mean.shape[1], dtype=torch.float64, requires_grad=True)
+    optimiser = torch.optim.Adam([departure], LEARNING_RATE)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, STEPS)
+    for _ in range(STEPS):
+        path = smooth + coarse[:, 1:-1] @ departure
+        loss = SYNCHRONY * (curves - path).norm(dim=-1).mean()
+        for part, length in zip(parts, lengths, strict=True):
+            loss = loss + _distance(path[:, part], curves[..., part])
+            loss = loss + EXCESS * (_length(path[:, part]) - length).relu()
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+    found: Tensor = (smooth + coarse[:, 1:-1] @ departure).detach().float()
+    return found
+
+
+def one_path(data: TrainingSet, geometry: Geometry, parts: Sequence[int] | None = None) -> tuple[States, TrainingSet]:
+    """The path nearest to demonstrations at equal times, and as many repetitions of it as there are demonstrations.
+
+    Args:
+        data: Demonstrations.
+        geometry: Their size and duration, which is the path's.
+        parts: How many coordinates each part of a state has; None: they are one part.
+    """
+    ends = [data.states[0].shape[1]] if parts is None else list(accumulate(parts))
+    curves = torch.stack([_resampled(states) for states in data.states]) / geometry.scale_m
+    path = nearest_path(curves, [slice(*bounds) for bounds in pairwise([0, *ends])]) * geometry.scale_m
+    times = torch.linspace(0, geometry.duration_s, len(path))
+    velocities = torch.gradient(path, spacing=(times,), dim=0)[0]
+    count = len(data.states)
+    return path, TrainingSet((times,) * count, (path,) * count, (velocities,) * count)
+
+
+def _resampled(states: Float[Tensor, "shown D"]) -> Float[Tensor, "point D"]:
+    place, own = np.linspace(0, len(states) - 1, POINTS), np.arange(len(states))
+    return torch.from_numpy(np.stack([np.interp(place, own, column) for column in states.T.numpy()], axis=-1))
+
+
+def _b_splines(points: int, count: int) -> np.ndarray:
+    """Values of cubic ones at equal distances, of which the first and last are 1 at the ends."""
+    knots = np.concatenate([np.zeros(3), np.linspace(0, 1, count - 2), np.ones(3)])
+    return np.asarray(BSpline.design_matrix(np.linspace(0, 1, points), knots, 3).toarray())
+
+
+def _distance(path: Float[Tensor, "point d"], curves: Float[Tensor, "demo point d"]) -> Float[Tensor, ""]:
+    apart = torch.cdist(path.expand(len(curves), -1, -1), curves)
+    return apart.amin(1).mean() + apart.amin(2).mean()
+
+
+def _length(curve: Float[Tensor, "*batch point d"]) -> Float[Tensor, "*batch"]:
+    lengths: Tensor = curve.diff(dim=-2).norm(dim=-1).sum(-1)
+    return lengths

@@ -1,0 +1,70 @@
+"""The path of a skill of one dimension goes where most demonstrations do."""
+
+import torch
+
+from geomotion.training.data import Geometry, TrainingSet
+from geomotion.training.nearest_path import nearest_path, one_path
+
+SHARES = torch.linspace(0, 1, 120)
+WHOLE = [slice(0, 2)]
+
+
+def arch(height: float, lag: float = 0.0) -> torch.Tensor:
+    """From (-1, 0) to (1, 0), at rest at both ends."""
+    share = (SHARES + lag * (torch.pi * SHARES).sin().square()).clamp(0, 1)
+    along = share * share * (3 - 2 * share)
+    return torch.stack([2 * along - 1, height * (torch.pi * along).sin()], dim=-1)
+
+
+def distance(path: torch.Tensor, curves: torch.Tensor) -> float:
+    apart = torch.cdist(path.expand(len(curves), -1, -1), curves)
+    return float(apart.amin(1).mean() + apart.amin(2).mean())
+
+
+def length(curve: torch.Tensor) -> float:
+    return float(curve.diff(dim=0).norm(dim=-1).sum())
+
+
+def test_the_path_of_curves_that_are_the_same_is_that_curve() -> None:
+    path, curves = nearest_path(arch(0.5).expand(4, -1, -1), WHOLE), arch(0.5).expand(4, -1, -1)
+    assert distance(path, curves) < 0.01
+    assert float((path - arch(0.5)).norm(dim=-1).mean()) < 0.015
+
+
+def test_the_path_is_a_median() -> None:
+    curves = torch.stack([arch(height) for height in (0.4, 0.42, 0.44, 0.46, 1.2)])
+    path = nearest_path(curves, WHOLE)
+    top = float(path[:, 1].max())
+    assert 0.38 < top < 0.5 < float(curves.mean(0)[:, 1].max())
+    assert distance(path, curves) < distance(curves.mean(0), curves)
+
+
+def test_demonstrations_of_other_timing_leave_the_shape_alone() -> None:
+    """Their mean at equal times is flatter than each of them where they turn."""
+    loops = torch.stack([arch(0.8, lag) for lag in (-0.2, -0.1, 0.0, 0.1, 0.2)])
+    folded = torch.stack([loops[..., 1], loops[..., 1].square()], dim=-1)  # up and down again at other times
+    path = nearest_path(folded, WHOLE)
+    assert distance(path, folded) < 0.6 * distance(folded.mean(0), folded)
+
+
+def test_the_ends_are_the_mean_ones_and_the_path_is_no_longer_than_curves_are() -> None:
+    noise = 0.05 * torch.randn(6, 1, 2, generator=torch.Generator().manual_seed(0))
+    curves = torch.stack([arch(height) for height in (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)]) + noise * SHARES[:, None]
+    path = nearest_path(curves, WHOLE)
+    torch.testing.assert_close(path[[0, -1]], curves.mean(0)[[0, -1]])
+    assert length(path) < 1.02 * sum(map(length, curves)) / len(curves)
+
+
+def test_units_do_not_matter() -> None:
+    times = SHARES * 3
+    curves = [arch(height) for height in (0.3, 0.5, 0.6)]
+    found = []
+    for unit in (1.0, 0.01):
+        states = tuple(unit * curve + 5 * unit for curve in curves)
+        velocities = tuple(torch.gradient(one, spacing=(times,), dim=0)[0] for one in states)
+        data = TrainingSet((times,) * 3, states, velocities)
+        path, repeated = one_path(data, Geometry.of(data))
+        assert len(repeated.states) == 3 and all(one is path for one in repeated.states)
+        assert float(repeated.times[0][-1]) == 3.0
+        found.append(path / unit)
+    torch.testing.assert_close(*found, rtol=1e-3, atol=1e-3)
