@@ -173,7 +173,11 @@ def of_codes(config: ModelConfig) -> ModelConfig:
     """The model that is learned of codes where there is a decoder; otherwise the same as that of states."""
     if not isinstance(config.chart, schema.InjectiveVaeChart):
         return config
-    return replace(config, chart=schema.IdentityChart() if config.chart.code_flow is None else config.chart.code_flow)
+    chart = schema.IdentityChart() if config.chart.code_flow is None else config.chart.code_flow
+    field = config.field
+    if isinstance(field, schema.ExactField):  # starts are states, and not codes
+        field = replace(field, start_fade_durations=None)
+    return replace(config, chart=chart, field=field)
 
 
 def _time_law(config: schema.TimeLawConfig, context: int) -> SplineTimeLaw | ConditionalTimeLaw | None:

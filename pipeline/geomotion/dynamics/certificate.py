@@ -27,10 +27,11 @@ WITH_DECAY = (
 )
 WITH_MEMORY = (
     " A motion remembers how far from the mean start it began, and carries this offset along, which fades out within "
-    "{fade_s:.3g} s. The claim is one of motions that remember the same start, as those of a pushed robot do, in the "
-    "metric at the state less the offset. Two undisturbed motions from different starts come together as the offset "
-    "fades, not at the rate."
+    "{fade_s:.3g} s{remainder}. The claim is one of motions that remember the same start, as those of a pushed robot "
+    "do, in the metric at the state less what it carries along. Two undisturbed motions from different starts come "
+    "together as the offset fades, not at the rate."
 )
+WITH_REMAINDER = ", and what its path lacks in the field, for {span_s:.3g} s"
 NOT_A_JACOBIAN = (
     "The matrix field of Eq. (5.1) is negative definite, but it is in general not the Jacobian of the line integral of "
     "Eq. (5.2): its rows are not gradients. Contraction is therefore measured on the true Jacobian."
@@ -159,7 +160,12 @@ def _about_time(model: ChartedField) -> str:
 
 
 def _about_starts(model: ChartedField) -> str:
-    return "" if model.start_memory is None else WITH_MEMORY.format(fade_s=float(model.start_memory.fade_s))
+    memory = model.start_memory
+    if memory is None:
+        return ""
+    is_bare = not memory.remainder.coefficients.any()
+    remainder = "" if is_bare else WITH_REMAINDER.format(span_s=float(memory.span_s))
+    return WITH_MEMORY.format(fade_s=float(memory.fade_s), remainder=remainder)
 
 
 def chart_distortion(model: ChartedField, states: States) -> Overshoot:

@@ -47,8 +47,8 @@ class FadingSpline(nn.Module):
         return self._combined(share, slice(0, 4))
 
     def rate(self, share: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch D"]:
-        """Derivatives."""
-        return self.intervals * self._combined(share, slice(4, 8))
+        """Derivatives; in 0, those of what comes."""
+        return (share >= 0)[..., None] * self.intervals * self._combined(share, slice(4, 8))
 
     def _combined(self, share: Float[Tensor, "*batch"], part: slice) -> Tensor:
         first, weights = self._weights(share, self.basis)

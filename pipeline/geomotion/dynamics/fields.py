@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 import torch
 from torch import nn
 
-from geomotion.dynamics.start_memory import CarriedOffset, StartMemory
+from geomotion.dynamics.start_memory import CarriedOffset, StartMemory, faded
 from geomotion.dynamics.time_law import Clock, ConditionalTimeLaw, LaterTimeLaw, TimeLaw
 from geomotion.types import Float, Latent, State, Tensor, Trajectories, Velocity
 
@@ -166,7 +166,7 @@ class ChartedField(nn.Module):
         return velocity
 
     def velocity(self, x: State, elapsed_s: Float[Tensor, "*#batch 1"]) -> Velocity:
-        """ẋ at a time since the start of the motion [s]."""
+        """ẋ at a time since the start of the motion [s]; what is carried along counts in motions that are begun."""
         velocity: Velocity = self(x, elapsed_s)
         return velocity
 
@@ -240,14 +240,15 @@ class ChartedField(nn.Module):
         """Let the motion from the mean start be a path that begins there, given at equal times over the mean duration.
 
         What the motion on the skill lacks of it is carried along. Where the path ends, the motion may still be on its
-        way to the goal; that is carried for `HELD` of the duration more.
+        way to the goal; what is left fades over `HELD` of the duration more.
         """
         memory = self.start_memory
         assert memory is not None
         held = path[-1:].expand(round(HELD * (len(path) - 1)), -1)
         times = torch.arange(len(path) + len(held), dtype=path.dtype) * (self.time_unit_s / (len(path) - 1))
         motion = self.forgetful().solve(self._on_skill(memory.mean_start), times)
-        memory.carry(torch.cat([path, held]) - motion, float(times[-1]))
+        left = faded((times - self.time_unit_s) / (times[-1] - self.time_unit_s))[:, None]
+        memory.carry(left * (torch.cat([path, held]) - motion), float(times[-1]))
 
     def _on_skill(self, x: State) -> State:
         """The state with the same skill coordinates on the manifold where all others vanish."""
@@ -264,7 +265,7 @@ class ChartedField(nn.Module):
         return ChartedField(self.chart, self.field, *clocks).train(self.training)
 
     def later(self, begin_s: float) -> "ChartedField":
-        """The same field for a motion that has run for some time already [s], from the mean start unless begun."""
+        """The same field for a motion that has run for some time already [s]; what is carried along, if begun."""
         if self.time_law is None:
             return self
         assert isinstance(self.time_law, TimeLaw)  # of one condition

@@ -15,7 +15,7 @@ class CarriedOffset(nn.Module):
 
     .. math:: c(t) = s(t)\,\delta + r(t), \qquad s = 1 - 3u^2 + 2u^3, \quad u = \min(t / T, 1)
 
-    s has a velocity that vanishes at both ends, so that motions still begin at rest; r ends at rest at zero.
+    s has a velocity that vanishes at both ends; r ends at rest at zero.
 
     Args:
         offset: δ of each motion.

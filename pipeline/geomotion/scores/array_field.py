@@ -62,7 +62,7 @@ class ArrayField:
     def without_offsets(
         self, states: Float[np.ndarray, "start time D"], times_s: Float[np.ndarray, " time"]
     ) -> Float[np.ndarray, "start time D"]:
-        """States of motions without what is remembered of where they began, at times as :meth:`velocity` has them."""
+        """States of motions without what they carry along, at times as :meth:`velocity` has them."""
         carried = self.field.carried
         return states if carried is None else states - _array(carried.along(self.tensor(times_s)))
 

@@ -94,7 +94,7 @@ def judge_returns(
         protocol: The displacements.
         proven_rate: τ > 0 of the certificate [1/s]; None if nothing is proven.
     """
-    exact, displaced = field.exact().forgetful(), judged[: protocol.count]  # displaced is not begun elsewhere
+    exact, displaced = field.exact(), judged[: protocol.count]
     parts = [
         follow_displaced(exact, one, protocol.offsets(joints)[number :: len(displaced)])
         for number, one in enumerate(displaced)
@@ -144,11 +144,13 @@ def follow_displaced(field: ArrayField, one: Judged, offsets_rad: Float[np.ndarr
     joints = offsets_rad.shape[1]
     starts = np.repeat(one.states[:1], len(offsets_rad) + 1, axis=0)
     starts[1:, :joints] += offsets_rad
-    rolled = field.roll(starts, one.time_s)
+    begun = field.begun(np.repeat(one.states[:1], len(starts), axis=0))  # displaced is not begun elsewhere
+    rolled = begun.roll(starts, one.time_s)
     demonstrated, moved = one.states[:, :joints], rolled[..., :joints]
     path = Path(demonstrated)
-    claimed = claimed_coordinates(field.to_claimed, rolled)
-    speeds = np.array([_top_speed(field, states, one.time_s, joints) for states in rolled])
+    claimed = claimed_coordinates(field.to_claimed, begun.without_offsets(rolled, one.time_s))
+    single = field.begun(one.states[:1])
+    speeds = np.array([_top_speed(single, states, one.time_s, joints) for states in rolled])
     return Returned(
         one.time_s,
         np.stack([path.distances(states) for states in moved[1:]]) / math.sqrt(joints),

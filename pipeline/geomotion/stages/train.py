@@ -190,11 +190,12 @@ def _closed_form(
 def _is_one_path(config: TrainConfig, data: TrainingSet) -> bool:
     field, training = config.model.field, config.training
     asked_for = isinstance(training, schema.TrajectoryTraining) and training.one_path
-    return asked_for and isinstance(field, schema.ExactField) and field.skill_dim == 1 and len(data.states) > 1
+    return asked_for and isinstance(field, schema.LinearField) and field.skill_dim == 1 and len(data.states) > 1
 
 
 def _parts(config: TrainConfig) -> tuple[int, ...] | None:
-    return POSE_PARTS if config.space in POSES else None
+    is_of_codes = isinstance(config.model.chart, schema.InjectiveVaeChart)
+    return POSE_PARTS if config.space in POSES and not is_of_codes else None
 
 
 def _objective(

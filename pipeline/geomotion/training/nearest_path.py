@@ -15,11 +15,14 @@ FINE, COARSE = 32, 12  # control points: of the mean of the demonstrations, and 
 STEPS = 400
 LEARNING_RATE = 0.015  # in sizes of the demonstrations
 SYNCHRONY = 0.07  # weight of distances at equal times: a path must not wait where demonstrations agree
+SMALL = 5e-3  # distances below it count less and less, or paths would be caught by the points of a curve
 EXCESS = 0.2  # weight of what is longer than a demonstration: nor visit the end of each of them
 
 
-def nearest_path(curves: Float[Tensor, "demo point D"], parts: Sequence[slice]) -> Float[Tensor, "point D"]:
-    r"""A path from the mean start to the mean end, with the least mean distance to curves.
+def nearest_path(
+    curves: Float[Tensor, "demo point D"], goal: Float[Tensor, " D"], parts: Sequence[slice]
+) -> Float[Tensor, "point D"]:
+    r"""A path from the mean start to the goal, with the least mean distance to curves.
 
     .. math::
         \sum_p \operatorname{mean}_i \left( d_p(m, x_i) + \tfrac{1}{5} (\ell_p(m) - \bar\ell_p)_+ \right)
@@ -30,6 +33,7 @@ def nearest_path(curves: Float[Tensor, "demo point D"], parts: Sequence[slice]) 
 
     Args:
         curves: At equal shares of their durations, in units of their size.
+        goal: Where they end, but for a part of where they began.
         parts: Coordinates that are compared apart, such as position and orientation.
     """
     curves = curves.double()
@@ -37,19 +41,19 @@ def nearest_path(curves: Float[Tensor, "demo point D"], parts: Sequence[slice]) 
     fine, coarse = (torch.from_numpy(_b_splines(len(mean), count)) for count in (FINE, COARSE))
     smooth = fine @ torch.linalg.lstsq(fine, mean).solution
     share = torch.linspace(0, 1, len(mean), dtype=torch.float64)[:, None]
-    smooth = smooth + torch.lerp(mean[0] - smooth[0], mean[-1] - smooth[-1], share)
+    smooth = smooth + torch.lerp(mean[0] - smooth[0], goal.double() - smooth[-1], share)
     lengths = [_length(curves[..., part]).mean() for part in parts]
     departure = torch.zeros(COARSE - 2, mean.shape[1], dtype=torch.float64, requires_grad=True)
     optimiser = torch.optim.Adam([departure], LEARNING_RATE)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, STEPS)
     for _ in range(STEPS):
         path = smooth + coarse[:, 1:-1] @ departure
-        loss = SYNCHRONY * (curves - path).norm(dim=-1).mean()
+        loss = SYNCHRONY * _rounded((curves - path).norm(dim=-1)).mean()
         for part, length in zip(parts, lengths, strict=True):
             loss = loss + _distance(path[:, part], curves[..., part])
             loss = loss + EXCESS * (_length(path[:, part]) - length).relu()
         optimiser.zero_grad()
-        loss.backward()
+        loss.backward()  # type: ignore[no-untyped-call]
         optimiser.step()
         schedule.step()
     found: Tensor = (smooth + coarse[:, 1:-1] @ departure).detach().float()
@@ -65,17 +69,19 @@ def one_path(data: TrainingSet, geometry: Geometry, parts: Sequence[int] | None 
         parts: How many coordinates each part of a state has; None: they are one part.
     """
     ends = [data.states[0].shape[1]] if parts is None else list(accumulate(parts))
-    curves = torch.stack([_resampled(states) for states in data.states]) / geometry.scale_m
-    path = nearest_path(curves, [slice(*bounds) for bounds in pairwise([0, *ends])]) * geometry.scale_m
+    shown = zip(data.times, data.states, strict=True)
+    curves = torch.stack([_resampled(times, states) for times, states in shown]) / geometry.scale_m
+    goal = torch.tensor(geometry.goal) / geometry.scale_m
+    path = nearest_path(curves, goal, [slice(*bounds) for bounds in pairwise([0, *ends])]) * geometry.scale_m
     times = torch.linspace(0, geometry.duration_s, len(path))
     velocities = torch.gradient(path, spacing=(times,), dim=0)[0]
     count = len(data.states)
     return path, TrainingSet((times,) * count, (path,) * count, (velocities,) * count)
 
 
-def _resampled(states: Float[Tensor, "shown D"]) -> Float[Tensor, "point D"]:
-    place, own = np.linspace(0, len(states) - 1, POINTS), np.arange(len(states))
-    return torch.from_numpy(np.stack([np.interp(place, own, column) for column in states.T.numpy()], axis=-1))
+def _resampled(times: Float[Tensor, " shown"], states: Float[Tensor, "shown D"]) -> Float[Tensor, "point D"]:
+    even = np.linspace(0, float(times[-1]), POINTS)
+    return torch.from_numpy(np.stack([np.interp(even, times.numpy(), column) for column in states.T.numpy()], axis=-1))
 
 
 def _b_splines(points: int, count: int) -> np.ndarray:
@@ -86,7 +92,11 @@ def _b_splines(points: int, count: int) -> np.ndarray:
 
 def _distance(path: Float[Tensor, "point d"], curves: Float[Tensor, "demo point d"]) -> Float[Tensor, ""]:
     apart = torch.cdist(path.expand(len(curves), -1, -1), curves)
-    return apart.amin(1).mean() + apart.amin(2).mean()
+    return _rounded(apart.amin(1)).mean() + _rounded(apart.amin(2)).mean()
+
+
+def _rounded(distance: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
+    return (distance.square() + SMALL**2).sqrt()
 
 
 def _length(curve: Float[Tensor, "*batch point d"]) -> Float[Tensor, "*batch"]:
