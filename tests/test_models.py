@@ -158,3 +158,14 @@ def test_a_skew_part_needs_two_coordinates():
 def test_the_goal_is_an_equilibrium_of_a_field_that_contracts_by_construction(name):
     skill = disturbed(CONFIGURATIONS[name])
     torch.testing.assert_close(skill.field(skill.goal), torch.zeros(2), atol=1e-6, rtol=0)
+
+
+def test_where_a_decoder_lies_between_codes_remember_no_start() -> None:
+    """What is remembered is a state; a decoded field would not know what became of it."""
+    field = schema.LinearField(skill_dim=1, start_fade_durations=1.0)
+    chart = schema.InjectiveVaeChart(latent_dim=1)
+    config = ModelConfig(chart, field, schema.NoRegulariser(), 1, schema.LearnedTimeLaw())
+    assert models.build(config, GEOMETRY).start_memory is None
+    assert models.build(models.of_codes(config), GEOMETRY).start_memory is None
+    plain = replace(config, chart=schema.FlowChart())
+    assert models.build(models.of_codes(plain), GEOMETRY).start_memory is not None

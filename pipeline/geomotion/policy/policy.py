@@ -64,7 +64,7 @@ class Policy(nn.Module):
         if self.safe is None:
             return super().float()
         for name, child in self.named_children():
-            if name not in ("field", "embedded", "safe"):
+            if name not in ("field", "embedded", "decoder", "safe"):
                 child.float()
         return self
 
@@ -86,7 +86,7 @@ class Policy(nn.Module):
         is_inside = self.training_range.contains(x, conditions)
         status = torch.where(is_defined, torch.where(is_inside, Status.ok, Status.outside), Status.undefined)
         trusted = tuple(torch.where(is_defined[..., None], one, 0) for one in velocities)
-        offset = self._offset(x, z, stretch)
+        offset = self._offset(exact, z, stretch)
         told = [] if offset is None else [offset.norm(dim=-1)]
         if self.safe is not None:
             region = self.safe.region
