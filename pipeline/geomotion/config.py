@@ -2132,7 +2132,7 @@ def register() -> None:
                 start_noise=0.1,
                 weight_penalty=1e-2,
                 projection_weight=60.0,
-                haste_weight=0.06,
+                haste_weight=0.15,
             ),
             "velocity": VelocityTraining,
             # behind a flow, longer training fits how fast each demonstration was, and bends the paths between them
