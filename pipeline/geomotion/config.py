@@ -1170,7 +1170,7 @@ class TrajectoryTraining(TrainingConfig):
     weight_penalty: float = 3e-5  # on the chart's squared parameters
     start_noise: float = 0.01  # of the mixtures' starts, whose targets stay
     mixing: float = 0.5  # similar demonstrations are mixed in pairs by up to this share
-    one_path: bool = True  # a skill of one dimension that remembers starts: of the path nearest to all demonstrations
+    one_path: bool = True  # a skill of one dimension that remembers starts follows the path nearest to all of them
     starts: int = 4  # of each demonstration in each step
     times: int = 32  # of each start
     curve_points: int = 64
@@ -2127,12 +2127,12 @@ def register() -> None:
                 weight_penalty=1e-4,
             ),
             "scattered": TrajectoryTraining(
-                steps=300,
+                steps=450,
                 mixing=1.0,
                 start_noise=0.1,
                 weight_penalty=1e-2,
                 projection_weight=60.0,
-                haste_weight=0.15,
+                haste_weight=0.06,
             ),
             "velocity": VelocityTraining,
             # behind a flow, longer training fits how fast each demonstration was, and bends the paths between them

@@ -20,6 +20,7 @@ from geomotion.files import read_json, write_json
 from geomotion.models import ModelConfig, Skill
 from geomotion.scores.score import Score
 from geomotion.stages.evaluate import EvaluateConfig, audit, compute, evaluate, require_peers_data, state_unit
+from geomotion.stages.evaluate_obstacles import judge_among_obstacles
 from geomotion.tracking import Artefacts, StageRun
 from geomotion.training.data import Geometry
 
@@ -208,6 +209,20 @@ def test_among_obstacles_contraction_is_measured_and_the_claim_stays_that_of_fre
     assert measured["obstacles.nearby.claimed.max_expansion"] >= 1
     scores = read_json(run.folder / "scores.json")["scores"]
     assert scores["obstacles.passage.never_reached"]["count"] <= 9
+
+
+def test_what_remembers_starts_is_judged_among_obstacles_as_displaced_from_one():
+    """Motions that an obstacle stops are followed anew on their own, fewer than there were."""
+    field = schema.LinearField(skill_dim=1, start_fade_durations=1.0, initial_rate_per_duration=4.0)
+    skill = make_skill(field=field, time_law=schema.LearnedTimeLaw())
+    demonstrations = draw_demonstrations(skill)
+    memory, trained = skill.field.start_memory, demonstrations.select(skill.train_demos)
+    memory.learn(torch.tensor(np.stack([one.state(("position_m",))[0] for one in trained.trajectories])).float())
+    memory.carry(0.01 * torch.randn(20, 2, generator=torch.Generator().manual_seed(0)), 2.0)
+    ball = schema.SphereObstacle(centre_m=[0.07, 0.08], radius_m=0.015)
+    scores = judge_among_obstacles(skill, demonstrations, ball, SETTINGS, SOLVER).scores
+    assert scores["obstacles.passage.clearance"].value > -1e-3
+    assert scores["obstacles.nearby.claimed.max_expansion"].value >= 1
 
 
 def test_the_stage_writes_what_it_computed(inputs, run, scores):

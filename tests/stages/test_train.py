@@ -15,7 +15,7 @@ from geomotion.models import ModelConfig
 from geomotion.stages.train import TrainConfig, train
 from geomotion.tracking import Artefacts, StageRun
 from geomotion.training.data import TrainingSet
-from geomotion.training.nearest_path import one_path as nearest_path_of
+from geomotion.training.nearest_path import path_nearest_to
 
 LETTERS = schema.LettersDataset(name="letters/s", letter="s", demos=3, points=40)
 LINEAR = ModelConfig(schema.IdentityChart(), schema.LinearField(), schema.NoRegulariser(), 0)
@@ -79,7 +79,7 @@ def test_a_skill_of_one_dimension_follows_the_path_nearest_to_what_was_shown_how
     data = TrainingSet.from_demonstrations(storage.load(ingested["ingest"].folder), channels).select(skill.train_demos)
     shown = StartMemory(2, float(memory.fade_s))
     shown.learn(torch.stack([states[0] for states in data.states]))
-    path, _ = nearest_path_of(data.without_offsets(shown), skill.geometry)
+    path = path_nearest_to(data.without_offsets(shown), skill.geometry)
     times = torch.linspace(0, skill.geometry.duration_s, len(path))
     motion = rollout(skill.field, memory.mean_start[None], times).states[0]
     apart = (motion - path).norm(dim=-1) / skill.geometry.scale_m

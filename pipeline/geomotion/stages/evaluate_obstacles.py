@@ -36,8 +36,8 @@ def judge_among_obstacles(
 ) -> Evaluation:
     """Contraction, nearby rollouts, and passage to the goal; nothing in free space.
 
-    Contraction is judged at mean speed and where obstacles are at time zero. A skill that remembers starts does so on
-    its way to the goal; nearby rollouts are of motions that remember the same one.
+    Contraction is judged at mean speed and where obstacles are at time zero. Of starts, a skill that remembers them
+    remembers that of the first demonstration: others are displaced, not begun elsewhere.
 
     Raises:
         InvalidSetting: If an obstacle does not fit the skill.
@@ -77,7 +77,7 @@ def judge_among_obstacles(
             judge_modulated_nearby(partial(rolled, forgetful), array.to_claimed, free(nearby), time_s),
             judge_passage(
                 field,
-                array.tensor(rolled(skill.begun(outside), outside, times_s)),
+                array.tensor(rolled(skill.begun(start[None]), outside, times_s)),
                 array.tensor(times_s),
                 skill.goal,
                 settings.goal_tolerance * tight.diagonal,

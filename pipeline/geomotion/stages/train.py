@@ -1,7 +1,7 @@
 """Fit a vector field to demonstrations."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from dataclasses import field as default
 
 import numpy as np
@@ -18,6 +18,7 @@ from geomotion.demos.pose_vectors import POSE_CHANNEL, fit_pose_coordinates, wit
 from geomotion.demos.selection import split, state_channels
 from geomotion.dynamics.certificate import Certificate, certify
 from geomotion.dynamics.conditional_certificate import for_all_conditions
+from geomotion.dynamics.embedded import EmbeddedField
 from geomotion.dynamics.fields import ChartedField
 from geomotion.dynamics.injective import decoded
 from geomotion.errors import DatasetError, InvalidSetting
@@ -32,7 +33,7 @@ from geomotion.training.conditioning import Conditioning, with_conditions
 from geomotion.training.data import Geometry, TrainingSet
 from geomotion.training.injective_vae import encoded
 from geomotion.training.likelihood import TransitionLikelihood
-from geomotion.training.nearest_path import one_path
+from geomotion.training.nearest_path import path_nearest_to
 from geomotion.training.objectives import VelocityReconstruction
 from geomotion.training.start import mean_square_distance, start_from_data
 from geomotion.training.trainer import History, Objective, Schedule, fit
@@ -95,20 +96,17 @@ def train(config: TrainConfig, inputs: Mapping[str, Artefacts], run: StageRun) -
         seen = encoded(data, decoder)
         place = Geometry.of(seen)
     field = models.build(models.of_codes(config.model), place)
-    path = None
     if field.start_memory is not None:
         field.start_memory.learn(torch.stack([states[0] for states in seen.states]))
         seen = seen.without_offsets(field.start_memory)
-        if _is_one_path(config, seen):
-            path, seen = one_path(seen, place, _parts(config))
     started = start_from_data(field, seen)
     if isinstance(config.training, schema.ClosedFormTraining):
         history = _closed_form(config, started, field, seen, place)
     else:
-        objective = _objective(config, seen, place, is_synchronous=path is not None)
+        objective = _objective(config, seen, place)
         history = fit(field, objective, _schedule(config), run.checkpoint, run.log_series)
-    if path is not None:
-        field.carry_to(path)
+    if _is_one_path(config, field, seen):
+        field.carry_to(path_nearest_to(seen, place, _parts(config)))
     elif field.start_memory is not None:
         field.begin_on_skill()
     if decoder is not None:
@@ -187,10 +185,10 @@ def _closed_form(
     return History([{"step": 0.0, "total": distance, "learning_rate": 0.0}])
 
 
-def _is_one_path(config: TrainConfig, data: TrainingSet) -> bool:
-    field, training = config.model.field, config.training
-    asked_for = isinstance(training, schema.TrajectoryTraining) and training.one_path
-    return asked_for and isinstance(field, schema.LinearField) and field.skill_dim == 1 and len(data.states) > 1
+def _is_one_path(config: TrainConfig, field: ChartedField, data: TrainingSet) -> bool:
+    asked_for = isinstance(config.training, schema.TrajectoryTraining) and config.training.one_path
+    is_curve = isinstance(field.field, EmbeddedField) and field.field.skill_dim == 1
+    return asked_for and field.start_memory is not None and is_curve and len(data.states) > 1
 
 
 def _parts(config: TrainConfig) -> tuple[int, ...] | None:
@@ -198,9 +196,7 @@ def _parts(config: TrainConfig) -> tuple[int, ...] | None:
     return POSE_PARTS if config.space in POSES and not is_of_codes else None
 
 
-def _objective(
-    config: TrainConfig, data: TrainingSet, geometry: Geometry, is_synchronous: bool
-) -> Objective[ChartedField]:
+def _objective(config: TrainConfig, data: TrainingSet, geometry: Geometry) -> Objective[ChartedField]:
     if isinstance(config.model.field, schema.MovementPrimitiveField):
         found = type(config.training).__name__.removesuffix("Training").lower()
         raise InvalidSetting("training", found, "closed_form: a movement primitive is computed from the demonstrations")
@@ -214,8 +210,6 @@ def _objective(
         case schema.TrajectoryTraining() as trajectory:
             if not isinstance(config.model.field, schema.LinearField):
                 raise InvalidSetting("training", "trajectory", "velocity: this field has no closed-form trajectories")
-            if is_synchronous:  # one path has one time law, to which the warm-up's weight does no harm
-                trajectory = replace(trajectory, equal_time_weight=trajectory.equal_time_warm_up_weight)
             return TrajectoryReproduction(data, geometry, trajectory, _parts(config))
         case schema.AdjointTraining() as adjoint:
             return TrajectoryShooting(data, geometry, adjoint)

@@ -1,4 +1,4 @@
-"""The path that a skill of one dimension has to be: the one that is nearest to all demonstrations."""
+"""The path that a skill of one dimension is: the one that is nearest to all demonstrations."""
 
 from collections.abc import Sequence
 from itertools import accumulate, pairwise
@@ -60,23 +60,20 @@ def nearest_path(
     return found
 
 
-def one_path(data: TrainingSet, geometry: Geometry, parts: Sequence[int] | None = None) -> tuple[States, TrainingSet]:
-    """The path nearest to demonstrations at equal times, and as many repetitions of it as there are demonstrations.
+def path_nearest_to(data: TrainingSet, geometry: Geometry, parts: Sequence[int] | None = None) -> States:
+    """The path nearest to demonstrations, at equal times over their mean duration [m].
 
     Args:
-        data: Demonstrations.
-        geometry: Their size and duration, which is the path's.
+        data: Demonstrations, which begin alike.
+        geometry: Their size and goal.
         parts: How many coordinates each part of a state has; None: they are one part.
     """
     ends = [data.states[0].shape[1]] if parts is None else list(accumulate(parts))
     shown = zip(data.times, data.states, strict=True)
     curves = torch.stack([_resampled(times, states) for times, states in shown]) / geometry.scale_m
     goal = torch.tensor(geometry.goal) / geometry.scale_m
-    path = nearest_path(curves, goal, [slice(*bounds) for bounds in pairwise([0, *ends])]) * geometry.scale_m
-    times = torch.linspace(0, geometry.duration_s, len(path))
-    velocities = torch.gradient(path, spacing=(times,), dim=0)[0]
-    count = len(data.states)
-    return path, TrainingSet((times,) * count, (path,) * count, (velocities,) * count)
+    path: States = geometry.scale_m * nearest_path(curves, goal, [slice(*bounds) for bounds in pairwise([0, *ends])])
+    return path
 
 
 def _resampled(times: Float[Tensor, " shown"], states: Float[Tensor, "shown D"]) -> Float[Tensor, "point D"]:
