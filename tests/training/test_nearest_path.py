@@ -75,3 +75,15 @@ def test_what_counts_is_when_samples_were_taken() -> None:
     data = TrainingSet((SHARES[places],) * 3, tuple(one[places] for one in lines), tuple(one[places] for one in lines))
     path = path_nearest_to(data, Geometry.of(data))
     torch.testing.assert_close(path[60], torch.zeros(2), rtol=0, atol=0.05)
+
+
+def test_a_path_does_not_wait_where_demonstrations_agree() -> None:
+    """Of demonstrations that part, most of what is near to all is where they begin."""
+    share = SHARES[:, None]
+    ways = [torch.tensor([1.0, side]) for side in (-0.6, -0.3, 0.0, 0.3, 0.6)]
+    curves = torch.stack([(share * share * (3 - 2 * share)) * way for way in ways])
+    mean = curves.mean(0)
+    path = nearest_path(curves, mean[-1], WHOLE)
+    scatter = (curves - mean).norm(dim=-1).mean(0)
+    assert float(((path - mean).norm(dim=-1) - scatter).max()) < 0.05
+    assert float(path[60, 0]) > 0.3

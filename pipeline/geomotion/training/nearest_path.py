@@ -16,7 +16,8 @@ STEPS = 400
 LEARNING_RATE = 0.015  # in sizes of the demonstrations
 SYNCHRONY = 0.07  # weight of distances at equal times: a path must not wait where demonstrations agree
 SMALL = 5e-3  # distances below it count less and less, or paths would be caught by the points of a curve
-EXCESS = 0.2  # weight of what is longer than a demonstration: nor visit the end of each of them
+OUTSIDE = 3.0  # of what leaves the band of the demonstrations
+EXCESS = 0.2  # of what is longer than a demonstration: nor must it visit the end of each of them
 
 
 def nearest_path(
@@ -25,11 +26,13 @@ def nearest_path(
     r"""A path from the mean start to the goal, with the least mean distance to curves.
 
     .. math::
-        \sum_p \operatorname{mean}_i \left( d_p(m, x_i) + \tfrac{1}{5} (\ell_p(m) - \bar\ell_p)_+ \right)
-        + \tfrac{7}{100} \operatorname{mean}_{i, t} \|m(t) - x_i(t)\|
+        \sum_p \left( \operatorname{mean}_i d_p(m, x_i) + 3 \operatorname{mean}_t (\|m - \bar x\|_p - \sigma_p)_+
+        + \tfrac{1}{5} (\ell_p(m) - \bar\ell_p)_+ \right)
+        + \tfrac{7}{100} \operatorname{mean}_{i, t} \|m - x_i\|
 
     d_p is the mean distance of the points of each curve to the nearest of the other, of the part p of the coordinates;
-    ℓ_p is the length. Distances and not their squares: the path goes where most demonstrations do, as a median.
+    σ_p is how far curves are from their mean x̄ at each time, in the mean, and ℓ_p the length. Distances and not their
+    squares: the path goes where most demonstrations do, as a median, and at no time where they are not.
 
     Args:
         curves: At equal shares of their durations, in units of their size.
@@ -43,13 +46,16 @@ def nearest_path(
     share = torch.linspace(0, 1, len(mean), dtype=torch.float64)[:, None]
     smooth = smooth + torch.lerp(mean[0] - smooth[0], goal.double() - smooth[-1], share)
     lengths = [_length(curves[..., part]).mean() for part in parts]
+    bands = [(curves[..., part] - mean[:, part]).norm(dim=-1).mean(0) for part in parts]
     departure = torch.zeros(COARSE - 2, mean.shape[1], dtype=torch.float64, requires_grad=True)
     optimiser = torch.optim.Adam([departure], LEARNING_RATE)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, STEPS)
     for _ in range(STEPS):
         path = smooth + coarse[:, 1:-1] @ departure
         loss = SYNCHRONY * _rounded((curves - path).norm(dim=-1)).mean()
-        for part, length in zip(parts, lengths, strict=True):
+        for part, length, band in zip(parts, lengths, bands, strict=True):
+            outside = ((path - mean)[:, part].norm(dim=-1) - band).relu()
+            loss = loss + OUTSIDE * outside.mean()
             loss = loss + _distance(path[:, part], curves[..., part])
             loss = loss + EXCESS * (_length(path[:, part]) - length).relu()
         optimiser.zero_grad()
