@@ -31,7 +31,7 @@ def nearest_path(
         + \tfrac{7}{100} \operatorname{mean}_{i, t} \|m - x_i\|
 
     d_p is the mean distance of the points of each curve to the nearest of the other, of the part p of the coordinates;
-    σ_p is how far curves are from their mean x̄ at each time, in the mean, and ℓ_p the length. Distances and not their
+    σ_p is how far the farthest curve is from their mean x̄ at each time, and ℓ_p the length. Distances and not their
     squares: the path goes where most demonstrations do, as a median, and at no time where they are not.
 
     Args:
@@ -46,7 +46,7 @@ def nearest_path(
     share = torch.linspace(0, 1, len(mean), dtype=torch.float64)[:, None]
     smooth = smooth + torch.lerp(mean[0] - smooth[0], goal.double() - smooth[-1], share)
     lengths = [_length(curves[..., part]).mean() for part in parts]
-    bands = [(curves[..., part] - mean[:, part]).norm(dim=-1).mean(0) for part in parts]
+    bands = [(curves[..., part] - mean[:, part]).norm(dim=-1).amax(0) for part in parts]
     departure = torch.zeros(COARSE - 2, mean.shape[1], dtype=torch.float64, requires_grad=True)
     optimiser = torch.optim.Adam([departure], LEARNING_RATE)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, STEPS)
