@@ -86,4 +86,4 @@ def test_a_path_does_not_wait_where_demonstrations_agree() -> None:
     path = nearest_path(curves, mean[-1], WHOLE)
     scatter = (curves - mean).norm(dim=-1).amax(0)
     assert float(((path - mean).norm(dim=-1) - scatter).max()) < 0.05
-    assert float(path[60, 0]) > 0.3
+    assert float(path[60, 0]) > 0.15  # where the mean is at 0.5, and waiting would be at 0
