@@ -59,6 +59,11 @@ def polyline(points: Float[np.ndarray, "point d"], count: int) -> Float[np.ndarr
     return np.stack([np.interp(np.linspace(0, 1, count), share, axis) for axis in points.T], axis=1)
 
 
+def even_basis(control_points: int, count: int) -> Float[np.ndarray, "point knot"]:
+    """Values of the basis functions of a spline with even knots, clamped at both ends, at evenly spaced parameters."""
+    return _even_basis(tuple(_clamped(control_points)[0].tolist()), count).copy()
+
+
 @lru_cache
 def _clamped(
     control_points: int,

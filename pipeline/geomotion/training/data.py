@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import numpy as np
 import torch
@@ -137,6 +138,12 @@ class Geometry:
         zeros = (0.0,) * dim
         axes = tuple(torch.eye(dim).flatten().tolist()) if dim > 2 else ()
         return cls(zeros, 1.0, zeros, zeros, duration_s, axes=axes)
+
+
+def part_slices(dim: int, parts: Sequence[int] | None) -> list[slice]:
+    """Where the parts of a state are, from how many coordinates each has; None: all of them are one part."""
+    ends = [dim] if parts is None else list(accumulate(parts))
+    return [slice(*bounds) for bounds in pairwise([0, *ends])]
 
 
 def principal_axes(offsets: Float[Tensor, "point D"]) -> Float[Tensor, "D D"]:

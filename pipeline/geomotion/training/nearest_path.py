@@ -1,13 +1,12 @@
 """The path that a skill of one dimension is: the one that is nearest to all demonstrations."""
 
 from collections.abc import Sequence
-from itertools import accumulate, pairwise
 
 import numpy as np
 import torch
-from scipy.interpolate import BSpline
 
-from geomotion.training.data import Geometry, TrainingSet
+from geomotion.manifolds.spline import even_basis
+from geomotion.training.data import Geometry, TrainingSet, part_slices
 from geomotion.types import Float, States, Tensor
 
 POINTS = 121  # at which paths are compared
@@ -41,7 +40,7 @@ def nearest_path(
     """
     curves = curves.double()
     mean = curves.mean(0)
-    fine, coarse = (torch.from_numpy(_b_splines(len(mean), count)) for count in (FINE, COARSE))
+    fine, coarse = (torch.from_numpy(even_basis(count, len(mean))) for count in (FINE, COARSE))
     smooth = fine @ torch.linalg.lstsq(fine, mean).solution
     share = torch.linspace(0, 1, len(mean), dtype=torch.float64)[:, None]
     smooth = smooth + torch.lerp(mean[0] - smooth[0], goal.double() - smooth[-1], share)
@@ -74,23 +73,17 @@ def path_nearest_to(data: TrainingSet, geometry: Geometry, parts: Sequence[int] 
         geometry: Their size and goal.
         parts: How many coordinates each part of a state has; None: they are one part.
     """
-    ends = [data.states[0].shape[1]] if parts is None else list(accumulate(parts))
+    slices = part_slices(data.states[0].shape[1], parts)
     shown = zip(data.times, data.states, strict=True)
     curves = torch.stack([_resampled(times, states) for times, states in shown]) / geometry.scale_m
     goal = torch.tensor(geometry.goal) / geometry.scale_m
-    path: States = geometry.scale_m * nearest_path(curves, goal, [slice(*bounds) for bounds in pairwise([0, *ends])])
+    path: States = geometry.scale_m * nearest_path(curves, goal, slices)
     return path
 
 
 def _resampled(times: Float[Tensor, " shown"], states: Float[Tensor, "shown D"]) -> Float[Tensor, "point D"]:
     even = np.linspace(0, float(times[-1]), POINTS)
     return torch.from_numpy(np.stack([np.interp(even, times.numpy(), column) for column in states.T.numpy()], axis=-1))
-
-
-def _b_splines(points: int, count: int) -> np.ndarray:
-    """Values of cubic ones at equal distances, of which the first and last are 1 at the ends."""
-    knots = np.concatenate([np.zeros(3), np.linspace(0, 1, count - 2), np.ones(3)])
-    return np.asarray(BSpline.design_matrix(np.linspace(0, 1, points), knots, 3).toarray())
 
 
 def _distance(path: Float[Tensor, "point d"], curves: Float[Tensor, "demo point d"]) -> Float[Tensor, ""]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
 
 import numpy as np
 import torch
@@ -11,7 +10,7 @@ from geomotion.config import TrajectoryTraining
 from geomotion.dynamics.charts import AnchoredChart
 from geomotion.dynamics.embedded import EmbeddedField
 from geomotion.dynamics.fields import ChartedField, SolvableField
-from geomotion.training.data import Geometry, Surroundings, TrainingSet
+from geomotion.training.data import Geometry, Surroundings, TrainingSet, part_slices
 from geomotion.training.trainer import Losses
 from geomotion.types import Float, Int, Tensor
 
@@ -71,8 +70,7 @@ class TrajectoryReproduction:
         self, data: TrainingSet, geometry: Geometry, settings: TrajectoryTraining, parts: Sequence[int] | None = None
     ) -> None:
         self.settings = settings
-        ends = [data.states[0].shape[1]] if parts is None else list(accumulate(parts))
-        self.parts = [slice(*bounds) for bounds in pairwise([0, *ends])]
+        self.parts = part_slices(data.states[0].shape[1], parts)
         self.scale_m = geometry.scale_m
         self.duration_s = geometry.duration_s
         self.centre = torch.tensor(geometry.centre)
